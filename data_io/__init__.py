@@ -1,0 +1,1 @@
+"""Files in and out; units and conventions are converted here and nowhere else."""

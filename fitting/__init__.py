@@ -1,0 +1,1 @@
+"""Surface statistics, image edges, parameters, objective, solvers and results."""

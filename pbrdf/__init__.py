@@ -1,0 +1,3 @@
+"""Polarised reflectance of real rough surfaces."""
+
+__version__ = "0.1.0"
