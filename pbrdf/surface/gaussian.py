@@ -1,0 +1,155 @@
+"""Random Gaussian surfaces: the paper's section 4.1 and equation (19)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.fft
+
+from pbrdf.errors import require
+from pbrdf.surface.heightmap import HeightMap
+
+
+@dataclass(frozen=True, kw_only=True)
+class GaussianSurface:
+    """Periodic Gaussian random surface with autocorrelation exp(-x²/lx² - y²/ly²).
+
+    Parameters
+    ----------
+    shape : (int, int)
+        Number of grid nodes (nx, ny); the periods are shape times spacing.
+    spacing : float or (float, float)
+        Grid steps dx, dy. [um]
+    corr_length : float or (float, float)
+        Where the autocorrelation falls to 1/e, one value or (lx, ly). [um]
+    slope_rms : float, optional
+        Rms slope per axis of the mesh facets, exact in the ensemble. With lx ≠ ly it is the
+        root mean square of the two axes, so that the rms gradient stays √2 slope_rms;
+        `facet_slope_rms` gives each. [1]
+    height_rms : float, optional
+        Rms height, exact in the ensemble. Give this or slope_rms. [um]
+
+    Raises
+    ------
+    ValueError
+        If both or neither of slope_rms and height_rms are given, a value is not positive, or
+        the grid cannot hold the correlation length.
+
+    Notes
+    -----
+    White noise is filtered with the square root of the discrete spectrum of the periodic
+    autocorrelation, so amplitudes as well as phases are random and heights are jointly
+    Gaussian on the grid. Equation (19), slope = √2 height / length, holds for the continuous
+    surface; facets average over one cell, which lowers the slope by 1 - 1/(4 m²) for m cells
+    a correlation length. The forward differences of the grid are what `slope_rms` fixes.
+
+    Examples
+    --------
+    >>> surface = GaussianSurface(shape=(256, 256), spacing=1.0, corr_length=16, slope_rms=0.3)
+    >>> surface.sample(seed=1)
+    HeightMap(256 x 256 nodes, spacing=(1.0, 1.0) um, periodic)
+    >>> round(surface.ensemble_height_rms, 3)
+    3.397
+    """
+
+    shape: tuple[int, int]
+    spacing: float | tuple[float, float]
+    corr_length: float | tuple[float, float]
+    slope_rms: float | None = None
+    height_rms: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.slope_rms is None) == (self.height_rms is None):
+            msg = (
+                "slope_rms and height_rms: give exactly one, got "
+                f"{self.slope_rms} and {self.height_rms}. The other follows from corr_length."
+            )
+            raise ValueError(msg)
+        for name in ("spacing", "corr_length", "slope_rms", "height_rms"):
+            value = getattr(self, name)
+            if value is not None:
+                require(
+                    name,
+                    value,
+                    lambda v: (v > 0) & np.isfinite(v),
+                    "be positive",
+                    "Lengths are micrometres, slopes are tangents.",
+                )
+        if len(self.shape) != 2 or min(self.shape) < 8:
+            msg = f"shape must be (nx, ny) with at least 8 nodes each, got {self.shape}."
+            raise ValueError(msg)
+        periods = np.asarray(self.shape) * self._steps
+        if (periods < 4 * self._lengths).any():
+            msg = (
+                f"shape times spacing must be at least 4 corr_length [um], got periods "
+                f"{periods.tolist()} for corr_length {self._lengths.tolist()}. "
+                "Take more nodes or a coarser spacing."
+            )
+            raise ValueError(msg)
+
+    @property
+    def _steps(self) -> np.ndarray:
+        return np.broadcast_to(np.asarray(self.spacing, dtype=np.float64), (2,))
+
+    @property
+    def _lengths(self) -> np.ndarray:
+        return np.broadcast_to(np.asarray(self.corr_length, dtype=np.float64), (2,))
+
+    @property
+    def isotropic(self) -> bool:
+        """True if both correlation lengths are the same."""
+        lx, ly = self._lengths
+        return bool(lx == ly)
+
+    def _correlation(self, axis: int) -> np.ndarray:
+        """Autocorrelation along one axis at the lags of the grid, made periodic."""
+        n, step, length = self.shape[axis], self._steps[axis], self._lengths[axis]
+        lags = np.arange(n) * step
+        images = np.arange(-2, 3)[:, None] * n * step
+        periodic: np.ndarray = np.exp(-(((lags + images) / length) ** 2)).sum(axis=0)
+        return periodic / periodic[0]
+
+    @cached_property
+    def facet_slope_rms(self) -> tuple[float, float]:
+        """Ensemble rms of the facet slopes along x and y. [1]"""
+        return (
+            float(self.ensemble_height_rms * self._slope_per_height(0)),
+            float(self.ensemble_height_rms * self._slope_per_height(1)),
+        )
+
+    def _slope_per_height(self, axis: int) -> float:
+        """Rms forward difference of a surface of unit rms height: 2 (C(0) - C(1)) / step²."""
+        n, step, length = self.shape[axis], self._steps[axis], self._lengths[axis]
+        # The images of the periodic autocorrelation matter below 6 correlation lengths only
+        periodic = self._correlation(axis)
+        drop = 1.0 - periodic[1]
+        if n * step > 12 * length:
+            drop = -np.expm1(-((step / length) ** 2))
+        return float(np.sqrt(2.0 * drop) / step)
+
+    @cached_property
+    def ensemble_height_rms(self) -> float:
+        """Ensemble rms height. [um]"""
+        if self.height_rms is not None:
+            return float(self.height_rms)
+    XX
+        slopes = self._slope_per_height(0), self._slope_per_height(1)
+        return float(self.slope_rms / np.sqrt(np.mean(np.square(slopes))))
+
+    @cached_property
+    def _filter(self) -> np.ndarray:
+        """Square root of the discrete spectrum, for a half-complex transform."""
+        along_x = scipy.fft.fft(self._correlation(0)).real
+        along_y = scipy.fft.rfft(self._correlation(1)).real
+        amplitude_x = np.sqrt(np.maximum(along_x, 0.0))
+        amplitude_y = np.sqrt(np.maximum(along_y, 0.0))
+        return self.ensemble_height_rms * amplitude_x[:, None] * amplitude_y[None, :]
+
+    def sample(self, seed: int | np.random.SeedSequence | None = None) -> HeightMap:
+        """Draw one realisation; the same seed gives the same heights bit for bit."""
+        rng = np.random.default_rng(seed)
+        spectrum = scipy.fft.rfft2(rng.standard_normal(self.shape), workers=1)
+        spectrum *= self._filter
+        heights = scipy.fft.irfft2(spectrum, s=self.shape, workers=1, overwrite_x=True)
+        dx, dy = self._steps
+        return HeightMap(heights, (float(dx), float(dy)), periodic=True)
