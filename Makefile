@@ -1,0 +1,84 @@
+# Every target makes the virtual environment it needs from the hashed locks, then works in it.
+# A second make finds the stamps and installs nothing.
+#
+#   make demo     recover a known coating from its micrograph and its goniometer scan
+#   make test     the tests that take seconds; test-all adds the slow ones
+#   make lint     style, types and the layer rule
+#   make bench    accuracy and speed as ratios        make studies   the study folders
+#   make docs     the documentation as a web site     make lock      renew the locks
+
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo demo-seeds test test-all lint bench studies docs lock clean
+
+# The first interpreter that starts and is new enough; set PYTHON to choose another
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
+	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+
+BIN := .venv/bin
+UV := VIRTUAL_ENV=$(CURDIR)/.venv $(BIN)/uv
+INSTALL := $(UV) pip install --quiet --require-hashes
+OUTPUT ?= demo-output
+
+help:
+	@sed -n 's/^#   //p' Makefile
+
+.venv/.installer: locks/installer.lock
+	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is needed; set PYTHON=..." >&2; exit 1; }
+	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $<
+	@touch $@
+
+.venv/.run: locks/run.lock pyproject.toml | .venv/.installer
+	@echo "Installing into .venv ..."
+	@$(INSTALL) -r $<
+	@$(UV) pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+.venv/.dev: locks/dev.lock .venv/.run
+	@$(INSTALL) -r $<
+	@touch $@
+
+.venv/.all: locks/all.lock .venv/.dev
+	@$(INSTALL) -r $<
+	@touch $@
+
+demo: .venv/.run
+	@$(BIN)/python examples/demo.py --output $(OUTPUT)
+
+demo-seeds: .venv/.run
+	@$(BIN)/python examples/seeds.py
+
+test: .venv/.dev
+	$(BIN)/python -m pytest -n auto
+
+test-all: .venv/.dev
+	$(BIN)/python -m pytest -n auto -m "not bench"
+
+lint: .venv/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -q tests/test_layers.py
+
+bench: .venv/.all
+	$(BIN)/python -m pytest -m bench -s
+
+studies: .venv/.run
+	@set -e; for script in studies/*/run.py; do echo "== $$script"; $(BIN)/python $$script; done
+
+docs: .venv/.dev
+	$(BIN)/mkdocs build --strict --quiet
+
+COMPILE := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \
+	--no-header --no-annotate --quiet
+
+lock: .venv/.installer
+	$(COMPILE) --all-extras pyproject.toml -o locks/all.lock
+	$(COMPILE) -c locks/all.lock --extra dev --extra docs pyproject.toml -o locks/dev.lock
+	$(COMPILE) -c locks/all.lock pyproject.toml -o locks/run.lock
+	$(COMPILE) -c locks/all.lock locks/installer.in -o locks/installer.lock
+
+clean:
+	rm -rf .venv build dist site $(OUTPUT) ./*.egg-info
