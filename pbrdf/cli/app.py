@@ -1,0 +1,107 @@
+"""Entry point: run a command; say in one line on stderr what is wrong and how to mend it.
+
+Commands import what they need when they run, so that `pbrdf --help` stays quick.
+"""
+
+import os
+import sys
+import warnings
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from pbrdf import __version__
+
+__all__ = ["app", "main"]
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="pbrdf",
+    help="Polarised reflectance of real rough surfaces: measured, simulated and fitted.",
+    no_args_is_help=False,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"pbrdf {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_version, is_eager=True, help="Show the version."
+        ),
+    ] = False,
+) -> None:
+    """Polarised reflectance of real rough surfaces: measured, simulated and fitted."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        What the user typed after `pbrdf`; sys.argv without it.
+
+    Returns
+    -------
+    int
+        0, 2 for input that cannot be used, 130 when interrupted. A fault of the program
+        itself is not caught. PBRDF_TRACEBACK=1 shows where an error was raised.
+    """
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    with warnings.catch_warnings():
+        warnings.showwarning = _one_line_warning
+        try:
+            code = app(
+                args=arguments or ["--help"], prog_name="pbrdf", standalone_mode=False
+            )
+        except typer.TyperException as error:
+            return _fail(
+                error, f"{_sentence(error)} See `pbrdf {_command(arguments)}--help`."
+            )
+        except (ValueError, OSError) as error:
+            return _fail(error, _sentence(error))
+        except (KeyboardInterrupt, typer.Abort):
+            typer.echo("Interrupted; nothing was written.", err=True)
+            return INTERRUPTED
+    return code if isinstance(code, int) else 0
+
+
+def _fail(error: Exception, message: str) -> int:
+    if os.environ.get("PBRDF_TRACEBACK"):
+        raise error
+    typer.echo(f"error: {message}", err=True)
+    return BAD_INPUT
+
+
+def _sentence(error: Exception) -> str:
+    """Return the message of an error on one line, with a full stop."""
+    if isinstance(error, OSError) and error.filename is not None:
+        text = f"{error.filename}: {error.strerror}. Check the name and the rights"
+    elif isinstance(error, typer.TyperException):
+        text = error.format_message()
+    else:
+        text = str(error) or type(error).__name__
+    text = " ".join(text.split())
+    return text if text.endswith((".", "!", "?")) else f"{text}."
+
+
+def _command(arguments: Sequence[str]) -> str:
+    names = {command.name for command in app.registered_commands}
+    return next((f"{word} " for word in arguments if word in names), "")
+
+
+def _one_line_warning(message: Warning | str, *_: object, **__: object) -> None:
+    typer.echo(f"warning: {' '.join(str(message).split())}", err=True)
