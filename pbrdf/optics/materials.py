@@ -1,0 +1,158 @@
+"""What a facet is made of: its complex index and the diffuse base under it."""
+
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pbrdf.errors import require
+from pbrdf.optics.dispersion import Dispersion, Table
+
+__all__ = ["Material"]
+
+
+@dataclass(frozen=True)
+class Material:
+    """Complex index N = n + i kappa of a homogeneous medium, seen from vacuum.
+
+    Parameters
+    ----------
+    n : float or Dispersion
+        Real part, > 0; `inf` is a perfect mirror. [1]
+    kappa : float or Dispersion
+        Imaginary part, >= 0, positive in an absorber (fields as exp(-i w t)). [1]
+    diffuse_albedo : float
+        Albedo in [0, 1] of a Lambertian base under the interface. [1]
+    name : str, optional
+        For messages and results.
+    source : str, optional
+        Where the constants come from.
+
+    Raises
+    ------
+    ValueError
+        If n <= 0, kappa < 0 (it is never conjugated) or the albedo leaves [0, 1].
+
+    Examples
+    --------
+    >>> Material(1.5, 0.1).index()
+    (1.5, 0.1)
+    >>> Material.from_table(wavelength=[0.4, 0.8], n=[1.5, 1.4]).index(0.6)
+    (1.45, 0.0)
+    """
+
+    n: float | Dispersion
+    kappa: float | Dispersion = 0.0
+    diffuse_albedo: float = 0.0
+    name: str | None = None
+    source: str | None = None
+
+    def __post_init__(self) -> None:
+        if not callable(self.n):
+            n = require(
+                "n", self.n, lambda v: (v > 0) & ((v <= 1e70) | np.isinf(v)),
+                "be > 0 and at most 1e70, or inf [1]", "A perfect mirror is n = inf.",
+            )  # fmt: skip
+            object.__setattr__(self, "n", _scalar("n", n))
+        if not callable(self.kappa):
+            kappa = require(
+                "kappa", self.kappa, lambda v: (v >= 0) & (v <= 1e70), "be >= 0 [1]",
+                "The index is n + i kappa; kappa >= 0 absorbs.",
+            )  # fmt: skip
+            object.__setattr__(self, "kappa", _scalar("kappa", kappa))
+        albedo = require(
+            "diffuse_albedo", self.diffuse_albedo, lambda v: (v >= 0) & (v <= 1),
+            "lie in [0, 1] [1]", "It is a fraction of the light.",
+        )  # fmt: skip
+        object.__setattr__(self, "diffuse_albedo", _scalar("diffuse_albedo", albedo))
+
+    @classmethod
+    def mirror(cls) -> "Material":
+        """Perfect mirror: r_s = -1, r_p = +1 at every angle."""
+        return cls(inf, name="mirror")
+
+    @classmethod
+    def black(cls) -> "Material":
+        """Perfect absorber: index-matched, nothing comes back."""
+        return cls(1.0, name="black")
+
+    @classmethod
+    def from_table(
+        cls,
+        *,
+        wavelength: npt.ArrayLike,
+        n: npt.ArrayLike,
+        kappa: npt.ArrayLike = 0.0,
+        diffuse_albedo: float = 0.0,
+        name: str | None = None,
+        source: str | None = None,
+    ) -> "Material":
+        """Material with constants tabulated against rising vacuum wavelengths [um].
+
+        Examples
+        --------
+        >>> Material.from_table(wavelength=[0.4, 0.8], n=[1.5, 1.4]).index(0.9)
+        Traceback (most recent call last):
+        ...
+        ValueError: wavelength must lie in [0.4, 0.8] um, the range of its source, got \
+0.90000000000000002. Optical constants are not extrapolated; wavelengths are in micrometres.
+        """
+        absorption = kappa if np.ndim(kappa) == 0 else Table.of("kappa", wavelength, kappa)
+        return cls(Table.of("n", wavelength, n), absorption, diffuse_albedo, name, source)  # type: ignore[arg-type]
+
+    @property
+    def dispersive(self) -> bool:
+        """Whether the index depends on the wavelength."""
+        return callable(self.n) or callable(self.kappa)
+
+    @property
+    def valid_range(self) -> tuple[float, float]:
+        """Wavelengths at which the index is known. [um]"""
+        ranges = [c.valid_range for c in (self.n, self.kappa) if callable(c)]
+        return max((r[0] for r in ranges), default=0.0), min(
+            (r[1] for r in ranges), default=inf
+        )
+
+    def index(self, wavelength: float | None = None) -> tuple[float, float]:
+        """(n, kappa) at one vacuum wavelength [um].
+
+        Raises
+        ------
+        ValueError
+            If the index is tabulated and the wavelength is missing or out of its range.
+        """
+        n, kappa = self.indices(wavelength)
+        return float(n), float(kappa)
+
+    def indices(
+        self, wavelength: npt.ArrayLike | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Both constants at vacuum wavelengths of any shape [um]."""
+        if self.dispersive and wavelength is None:
+            low, high = self.valid_range
+            msg = (
+                f"wavelength must be given for {self.name or 'a tabulated material'}, "
+                f"got None. Pass one between {low:g} and {high:g} um."
+            )
+            raise ValueError(msg)
+        n = _at(self.n, wavelength)
+        kappa = _at(self.kappa, wavelength)
+        return n, kappa
+
+
+def _at(constant: float | Dispersion, wavelength: npt.ArrayLike | None) -> np.ndarray:
+    """Evaluate a dispersion; a number stays as it is."""
+    if callable(constant):
+        return constant(np.asarray(wavelength, dtype=np.float64))
+    return np.asarray(constant, dtype=np.float64)
+
+
+def _scalar(name: str, value: Any) -> float:
+    """One float; a list of values needs `Material.from_table`."""
+    if np.ndim(value):
+        got = f"got shape {np.shape(value)}. Use Material.from_table."
+        msg = f"{name} must be one number, {got}"
+        raise ValueError(msg)
+    return float(value)
