@@ -132,9 +132,9 @@ class GaussianSurface:
         """Ensemble rms height. [um]"""
         if self.height_rms is not None:
             return float(self.height_rms)
-    XX
         slopes = self._slope_per_height(0), self._slope_per_height(1)
-        return float(self.slope_rms / np.sqrt(np.mean(np.square(slopes))))
+        wanted = 0.0 if self.slope_rms is None else self.slope_rms
+        return float(wanted / np.sqrt(np.mean(np.square(slopes))))
 
     @cached_property
     def _filter(self) -> np.ndarray:

@@ -1,0 +1,230 @@
+"""Exact walk of a ray over a triangulated height field.
+
+The field is a grid of cells, each split along the diagonal u = v into two facets. Positions
+are counted in cells along x and y, heights in the unit of the caller; `speed` is the ray
+direction in those units, so a point of the ray is start + t * speed. A pyramid of block
+maxima lets a ray skip every block that it passes above.
+
+On its way through neighbouring cells the walk carries the clearance of the ray above the
+surface from facet to facet. A hit is a change of its sign, so that no ray can slip through
+an edge or a vertex, and a ray that starts on a facet needs no offset: its clearance there is
+t times its speed away from the facet, without cancellation.
+"""
+
+import math
+
+import numpy as np
+
+from pbrdf.kernels import jit
+
+ESCAPED, HIT, SIDE, LOST = 0, 1, 2, 3
+FACET_LOW, FACET_HIGH = 0, 1  # the facet with u > v, and the one with u < v
+UNKNOWN = -1.0  # a clearance that was not followed
+START_LEVEL = 3  # blocks of 8 cells: where a ray from above starts to look
+
+
+def block_maxima(heights: np.ndarray, periodic: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Maximum height over blocks of 2, 4, 8 ... cells.
+
+    Returns the levels one after another in a flat array, level 1 first, and the table
+    (offset, blocks along y) of each level, shape (levels, 2).
+    """
+    if periodic:
+        top = np.maximum(heights, np.roll(heights, -1, axis=0))
+        top = np.maximum(top, np.roll(top, -1, axis=1))
+    else:
+        top = np.maximum(heights[1:], heights[:-1])
+        top = np.maximum(top[:, 1:], top[:, :-1])
+    levels, table, offset = [], [], 0
+    while True:
+        top = np.pad(top, [(0, n % 2) for n in top.shape], constant_values=-np.inf)
+        top = top.reshape(top.shape[0] // 2, 2, top.shape[1] // 2, 2).max(axis=(1, 3))
+        levels.append(top.ravel())
+        table.append((offset, top.shape[1]))
+        offset += top.size
+        if max(top.shape) <= 2:
+            return np.concatenate(levels), np.array(table, dtype=np.int64)
+
+
+@jit(inline="always")
+def corner_heights(heights, i, j, periodic):
+    """Heights of the corners (i, j), (i+1, j), (i, j+1), (i+1, j+1) of a cell."""
+    i1 = i + 1
+    j1 = j + 1
+    if periodic:
+        if i1 == heights.shape[0]:
+            i1 = 0
+        if j1 == heights.shape[1]:
+            j1 = 0
+    return heights[i, j], heights[i1, j], heights[i, j1], heights[i1, j1]
+
+
+@jit(inline="always")
+def facet_gradient(heights, i, j, facet, periodic):
+    """Height step per cell along x and y on one facet of cell (i, j)."""
+    z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
+    if facet == FACET_LOW:
+        return z10 - z00, z11 - z10
+    return z11 - z01, z01 - z00
+
+
+@jit(inline="always")
+def plane_height(z00, z10, z01, z11, facet, u, v):
+    """Height of one facet's plane at (u, v) of its cell, from the corner heights."""
+    if facet == FACET_LOW:
+        return z00 + (z10 - z00) * u + (z11 - z10) * v
+    return z00 + (z11 - z01) * u + (z01 - z00) * v
+
+
+@jit(inline="always")
+def zero_between(t_a, t_b, clear_a, clear_b):
+    """Time at which a clearance that is linear between two times reaches zero."""
+    return min(max(t_a + (t_b - t_a) * (clear_a / (clear_a - clear_b)), t_a), t_b)
+
+
+@jit
+def fall(heights, periodic, i, j, u, v, z, speed_z):
+    """Fate of a vertical ray."""
+    if speed_z >= 0.0:
+        return ESCAPED, i, j, -1, u, v, z
+    z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
+    facet = FACET_LOW if u > v else FACET_HIGH
+    return HIT, i, j, facet, u, v, plane_height(z00, z10, z01, z11, facet, u, v)
+
+
+@jit
+def walk(
+    heights, maxima, levels, z_top, periodic,
+    i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, max_steps,
+):  # fmt: skip
+    """Follow a ray from the place (u, v) of cell (i, j) at height z to the next facet it meets.
+
+    With facet >= 0 the ray starts on that facet and leaves it at `leave_rate` > 0 per unit of
+    t; with -1 it starts in free space. Returns (fate, i, j, facet, u, v, z).
+    """
+    nx = heights.shape[0] if periodic else heights.shape[0] - 1
+    ny = heights.shape[1] if periodic else heights.shape[1] - 1
+    if speed_x == 0.0 and speed_y == 0.0:
+        return fall(heights, periodic, i, j, u, v, z, speed_z)
+
+    # The ray in the plane is x0 + speed_x t; x0 moves back by a period at each wrap
+    x0 = i + u
+    y0 = j + v
+    forward_x = speed_x > 0.0
+    forward_y = speed_y > 0.0
+    rising = speed_z >= 0.0
+    t = 0.0
+    clear = UNKNOWN
+    level = 0 if facet >= 0 else min(START_LEVEL, levels.shape[0])
+
+    for _ in range(max_steps):
+        # Above the highest peak a rising ray is free
+        z_in = z + speed_z * t
+        if rising and z_in > z_top:
+            return ESCAPED, i, j, -1, u, v, z_in
+
+        # Where and when the ray leaves the present block
+        low_x = (i >> level) << level
+        low_y = (j >> level) << level
+        high_x = min(low_x + (1 << level), nx)
+        high_y = min(low_y + (1 << level), ny)
+        t_x = math.inf
+        t_y = math.inf
+        if speed_x != 0.0:
+            t_x = ((high_x if forward_x else low_x) - x0) / speed_x
+        if speed_y != 0.0:
+            t_y = ((high_y if forward_y else low_y) - y0) / speed_y
+        t_out = max(min(t_x, t_y), t)
+        z_out = z + speed_z * t_out
+        lowest = z_in if rising else z_out
+
+        if level > 0:
+            # Look closer unless the ray passes above the whole block
+            offset, row = levels[level - 1]
+            if lowest <= maxima[offset + (i >> level) * row + (j >> level)]:
+                level -= 1
+                continue
+            clear = UNKNOWN
+        else:
+            z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
+            if facet < 0 and lowest > max(max(z00, z10), max(z01, z11)):
+                clear = UNKNOWN
+            else:
+                # Places where the ray enters and leaves the cell; u - v tells the facet
+                u_in = x0 + speed_x * t - i
+                v_in = y0 + speed_y * t - j
+                u_out = x0 + speed_x * t_out - i
+                v_out = y0 + speed_y * t_out - j
+                side_in = u_in - v_in
+                side_out = u_out - v_out
+                if facet >= 0:
+                    first = facet
+                    split = side_out < 0.0 if facet == FACET_LOW else side_out > 0.0
+                else:
+                    split = side_in * side_out < 0.0
+                    side = side_in if split else side_in + side_out
+                    first = FACET_LOW if side > 0.0 else FACET_HIGH
+
+                # Through the first facet, to the diagonal or out of the cell
+                t_mid = t_out
+                if split and side_in != side_out:
+                    share = min(max(side_in / (side_in - side_out), 0.0), 1.0)
+                    t_mid = t + (t_out - t) * share
+                if facet >= 0:
+                    # A plane just left is not met again
+                    clear_mid = t_mid * leave_rate
+                    facet = -1
+                else:
+                    if clear < 0.0:
+                        surface = plane_height(z00, z10, z01, z11, first, u_in, v_in)
+                        clear = max(z_in - surface, 0.0)
+                    u_mid = x0 + speed_x * t_mid - i
+                    v_mid = y0 + speed_y * t_mid - j
+                    surface = plane_height(z00, z10, z01, z11, first, u_mid, v_mid)
+                    clear_mid = z + speed_z * t_mid - surface
+                    if clear_mid <= 0.0:
+                        t_hit = zero_between(t, t_mid, clear, clear_mid)
+                        u = x0 + speed_x * t_hit - i
+                        v = y0 + speed_y * t_hit - j
+                        return HIT, i, j, first, u, v, z + speed_z * t_hit
+                clear = clear_mid
+
+                # Through the second facet, if the ray crosses the diagonal
+                if split:
+                    second = 1 - first
+                    surface = plane_height(z00, z10, z01, z11, second, u_out, v_out)
+                    clear = z_out - surface
+                    if clear <= 0.0:
+                        t_hit = zero_between(t_mid, t_out, clear_mid, clear)
+                        u = x0 + speed_x * t_hit - i
+                        v = y0 + speed_y * t_hit - j
+                        return HIT, i, j, second, u, v, z + speed_z * t_hit
+
+        # Step over the edge into the next block; inside a block keep to its rows
+        if t_x <= t_y:
+            i = high_x if forward_x else low_x - 1
+            if level > 0:
+                j = min(max(int(y0 + speed_y * t_out), low_y), high_y - 1)
+        else:
+            j = high_y if forward_y else low_y - 1
+            if level > 0:
+                i = min(max(int(x0 + speed_x * t_out), low_x), high_x - 1)
+        if i < 0 or i >= nx or j < 0 or j >= ny:
+            if not periodic:
+                return SIDE, i, j, -1, u, v, z + speed_z * t_out
+            if i < 0:
+                i += nx
+                x0 += nx
+            elif i >= nx:
+                i -= nx
+                x0 -= nx
+            if j < 0:
+                j += ny
+                y0 += ny
+            elif j >= ny:
+                j -= ny
+                y0 -= ny
+        t = t_out
+        if clear < 0.0 and level < levels.shape[0]:
+            level += 1
+    return LOST, i, j, -1, u, v, z + speed_z * t
