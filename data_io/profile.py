@@ -1,0 +1,284 @@
+"""Surface profiles z(x): the container and the reader of text files."""
+
+import re
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from data_io._text import (
+    COMMENT_MARKS,
+    ZIP_MAGIC,
+    Line,
+    find_delimiter,
+    header_units,
+    read_bytes,
+    read_lines,
+    read_numbers,
+    split_header,
+    unit_factor,
+)
+from data_io.x3p import read_x3p
+from pbrdf.errors import DataFileError, require
+
+
+class MissingUnitWarning(UserWarning):
+    """A file names no length unit and none was given: micrometres are assumed."""
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Profile:
+    """Heights z over rising positions x, evenly spaced or not.
+
+    Parameters
+    ----------
+    x : array_like, shape (n,)
+        Positions, strictly rising. [um]
+    z : array_like, shape (n,)
+        Heights. [um]
+
+    Raises
+    ------
+    ValueError
+        If the arrays differ in shape, hold fewer than three points or non-finite values, or
+        x does not rise.
+
+    Examples
+    --------
+    >>> Profile([0.0, 1.0, 2.5], [0.1, 0.0, 0.3])
+    Profile(3 points, length 2.5 um, unevenly spaced)
+    """
+
+    x: np.ndarray
+    z: np.ndarray
+
+    def __init__(self, x: npt.ArrayLike, z: npt.ArrayLike) -> None:
+        cure = "Leave missing points out; a profile may be unevenly spaced."
+        arrays = [
+            require(name, values, np.isfinite, "be finite [um]", cure).copy()
+            for name, values in (("x", x), ("z", z))
+        ]
+        if arrays[0].ndim != 1 or arrays[0].shape != arrays[1].shape:
+            msg = (
+                f"x and z must be one-dimensional and of one length, got shapes "
+                f"{arrays[0].shape} and {arrays[1].shape}. Give one height a position."
+            )
+            raise ValueError(msg)
+        if arrays[0].size < 3:
+            msg = f"x must have at least 3 points, got {arrays[0].size}. Measure more."
+            raise ValueError(msg)
+        rising = np.diff(arrays[0]) > 0
+        if not rising.all():
+            i = int(np.argmin(rising)) + 1
+            msg = (
+                f"x must rise strictly [um], got {arrays[0][i]:.9g} after "
+                f"{arrays[0][i - 1]:.9g} at index {i}. Sort points and merge equal ones."
+            )
+            raise ValueError(msg)
+        for name, array in zip(("x", "z"), arrays, strict=True):
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return self.x.size
+
+    @property
+    def length(self) -> float:
+        """Distance from the first to the last point. [um]"""
+        return float(self.x[-1] - self.x[0])
+
+    @property
+    def spacing(self) -> float:
+        """Mean distance of neighbouring points. [um]"""
+        return self.length / (self.size - 1)
+
+    @property
+    def evenly_spaced(self) -> bool:
+        """True if every step agrees with the mean step to 1 %.
+
+        Files print positions with few digits, so exact equality would reject them.
+        """
+        return bool(np.abs(np.diff(self.x) / self.spacing - 1).max() < 0.01)
+
+    def __repr__(self) -> str:
+        kind = "evenly" if self.evenly_spaced else "unevenly"
+        return f"Profile({self.size} points, length {self.length:.6g} um, {kind} spaced)"
+
+
+def read_profile(path: str | Path, *, unit: str | tuple[str, str] | None = None) -> Profile:
+    r"""Read a surface profile from a text file of two columns, x and z, or from x3p.
+
+    Comma, semicolon, tab and space separate columns; lines that start with # or % are
+    comments. Units come from the header (``x_um,z_um`` or ``x [mm]  z [nm]``) or from the
+    caller. Columns headed x and z may stand in any order and among others. A scan written
+    from right to left is turned round.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    unit : str or (str, str), optional
+        Length unit of both columns, or of x and of z: nm, um, mm, m. Only for a file that
+        names none; without it such a file is taken as micrometres, with a warning.
+
+    Returns
+    -------
+    Profile
+        Positions and heights. [um]
+
+    Raises
+    ------
+    DataFileError
+        Naming line and column of the first fault.
+
+    Warns
+    -----
+    MissingUnitWarning
+        If neither the file nor the caller names a unit.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "edge.csv"
+    ...     _ = path.write_text("x_nm,z_nm\n0,10\n500,40\n1000,20\n")
+    ...     read_profile(path)
+    Profile(3 points, length 1 um, evenly spaced)
+    """
+    if read_bytes(path)[:4] == ZIP_MAGIC:
+        return _read_x3p_profile(path)
+    header, data = split_header(path, read_lines(path))
+    names, column_x, column_z = _columns(path, header, data[0])
+    block = read_numbers(path, data, names)
+    factor_x, factor_z = _factors(path, header, unit, names, column_x, column_z)
+    return build_profile(
+        path,
+        block[:, column_x] * factor_x,
+        block[:, column_z] * factor_z,
+        lines=[line.number for line in data],
+    )
+
+
+def _read_x3p_profile(path: str | Path) -> Profile:
+    """Read an x3p file of one line."""
+    content = read_x3p(path)
+    if content.rows.shape[0] != 1:
+        problem = f"expected a profile, got a map of {content.rows.shape[0]} lines"
+        raise DataFileError(path, problem, "Read it with read_height_map.")
+    z = content.rows[0]
+    measured = np.isfinite(z)
+    return build_profile(
+        path, (np.arange(z.size) * content.steps[0])[measured], z[measured]
+    )
+
+
+def build_profile(
+    path: str | Path, x: np.ndarray, z: np.ndarray, *, lines: list[int] | None = None
+) -> Profile:
+    """Make a Profile of file content, naming the line of a point that does not fit."""
+
+    def place(i: int) -> int | None:
+        return lines[i] if lines else None
+
+    for name, values in (("x", x), ("z", z)):
+        missing = np.flatnonzero(~np.isfinite(values))
+        if missing.size:
+            raise DataFileError(
+                path,
+                f"expected a number, got {values[missing[0]]}",
+                "Leave the row out; a profile may be unevenly spaced.",
+                line=place(int(missing[0])),
+                column=name,
+            )
+    if x.size < 3:
+        problem = f"expected at least 3 points, got {x.size}"
+        raise DataFileError(path, problem, "The file is truncated, or not a profile.")
+    falling = bool(x[0] > x[-1])
+    steps = np.diff(-x if falling else x)
+    wrong = np.flatnonzero(steps <= 0)
+    if wrong.size:
+        i = int(wrong[0]) + 1
+        problem = f"expected x to go one way, got {x[i]:.9g} um after {x[i - 1]:.9g} um"
+        cure = (
+            "Sort the points, merge equal ones, and cut re-entrant parts (overhangs) out."
+        )
+        raise DataFileError(path, problem, cure, line=place(i), column="x")
+    return Profile(x[::-1], z[::-1]) if falling else Profile(x, z)
+
+
+def _columns(
+    path: str | Path, header: list[Line], first: Line
+) -> tuple[list[str] | None, int, int]:
+    """Return the column names, if the header has them, and which columns are x and z."""
+    delimiter = find_delimiter(first)
+    width = len(first.cells(delimiter))
+    names = None
+    if header:
+        text = header[-1].text.strip().lstrip("".join(COMMENT_MARKS)).strip()
+        candidate = Line(header[-1].number, text).cells(delimiter)
+        if len(candidate) == width:
+            names = candidate
+    # The axis is the first word of a name: "x_um", "Z [nm]", "x (mm)"
+    axes = [re.split(r"[_\s\[(]", name.lower(), maxsplit=1)[0] for name in names or []]
+    for axis in ("x", "z"):
+        if axes.count(axis) > 1:
+            problem = f"expected one column {axis}, found {axes.count(axis)}"
+            cure = "Remove or rename the others."
+            raise DataFileError(path, problem, cure, line=header[-1].number, column=axis)
+    if "x" in axes and "z" in axes:
+        return names, axes.index("x"), axes.index("z")
+    if width == 2:
+        return names, 0, 1
+    problem = f"expected two columns, x and z, got {width}"
+    cure = "Keep two columns or head them x and z; commas separate columns, not decimals."
+    raise DataFileError(path, problem, cure, line=first.number)
+
+
+def _factors(
+    path: str | Path,
+    header: list[Line],
+    unit: str | tuple[str, str] | None,
+    names: list[str] | None,
+    column_x: int,
+    column_z: int,
+) -> tuple[float, float]:
+    """Return the size of the units of x and z. [um]"""
+    given = None
+    if unit is not None:
+        pair = (unit, unit) if isinstance(unit, str) else unit
+        given = unit_factor(pair[0]), unit_factor(pair[1])
+    line, found = _named_units(header, names, column_x, column_z)
+    if found is None:
+        if given is None:
+            msg = (
+                f"{Path(path).name}: no length unit is named, micrometres are assumed. "
+                "Name units in the header (x_um,z_um), or give unit=."
+            )
+            warnings.warn(msg, MissingUnitWarning, stacklevel=4)
+            return 1.0, 1.0
+        return given
+    factors = unit_factor(found[0]), unit_factor(found[1])
+    if given is not None and given != factors:
+        problem = f"expected the unit given, {unit}, the header says {found[0]}, {found[1]}"
+        cure = "Leave the argument out or mend the header."
+        raise DataFileError(path, problem, cure, line=line)
+    return factors
+
+
+def _named_units(
+    header: list[Line], names: list[str] | None, column_x: int, column_z: int
+) -> tuple[int | None, tuple[str, str] | None]:
+    """Return the line that names units and the units of x and z, or None."""
+    if names is not None:
+        in_x, in_z = header_units(names[column_x]), header_units(names[column_z])
+        if in_x and in_z:
+            return header[-1].number, (in_x[0], in_z[0])
+    for line in reversed(header):
+        units = header_units(line.text)
+        if len(units) in (1, 2):
+            return line.number, (units[0], units[-1])
+    return None, None
