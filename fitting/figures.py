@@ -1,4 +1,4 @@
-"""Figures of a surface, and of a scan beside its models; matplotlib comes with the first."""
+"""Figures of a surface, and of a scan beside its models."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -42,7 +42,7 @@ def histogram_figure(
     Parameters
     ----------
     panels : sequence of (label, edges, density, rms, legend)
-        Axis label with unit, bin edges (n + 1), density (n), rms and legend of the Gaussian.
+        Axis label with unit, bin edges (n + 1), density (n), rms of the Gaussian, legend.
     """
     figure, axes = new_figure(1, len(panels), (4.6 * len(panels), 3.4))
     for axis, (label, edges, density, rms, legend) in zip(axes.flat, panels, strict=True):

@@ -53,7 +53,7 @@ class SimulatedCurve:
         here = self.dataset.sel(theta_i=theta_i, method="nearest")
         if abs(float(here.theta_i) - theta_i) > 1e-6:
             simulated = ", ".join(f"{value:.6g}" for value in self.dataset.theta_i.values)
-            msg = f"theta_i must be one of {simulated} [rad], got {theta_i:.6g}. Simulate it."
+            msg = f"theta_i must be one of {simulated} [rad], got {theta_i:.6g}."
             raise ValueError(msg)
         order = ("theta_s", "dphi", "stokes_out", "stokes_in")
         value = here.brdf.sum("bounces").transpose(*order).values
