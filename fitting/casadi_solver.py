@@ -1,0 +1,201 @@
+"""Minimise an objective with CasADi: IPOPT on exact derivatives, qpOASES if linear."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from fitting.objective import Curve, Objective
+from fitting.solution import Solution, better, early_end
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = ["solve_casadi"]
+
+_SOLVERS: "WeakKeyDictionary[Curve, dict[str, casadi.Function]]" = WeakKeyDictionary()
+
+_IPOPT_OPTIONS = {
+    "print_time": False,
+    "show_eval_warnings": False,
+    "error_on_fail": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.tol": 1e-11,
+    # An "acceptable" point is no minimum: stop at one only after the restarts below
+    "ipopt.acceptable_iter": 0,
+    "ipopt.bound_relax_factor": 0.0,
+}
+
+_STATUS = {
+    "Solve_Succeeded": "converged",
+    "Solved_To_Acceptable_Level": "converged to rounding error",
+    "Search_Direction_Becomes_Too_Small": "converged to rounding error",
+    "Maximum_Iterations_Exceeded": "stopped at the iteration limit",
+    "Diverging_Iterates": "stopped: the parameters ran away without a minimum",
+    "Restoration_Failed": "stopped: no step reduced the cost",
+    "Invalid_Number_Detected": "stopped: the curve or a derivative is not finite",
+}
+
+
+def solve_casadi(objective: Objective, *, max_iterations: int = 500) -> Solution:
+    """Return the minimum nearest to the start, inside the bounds.
+
+    A curve that is linear in its parameters is solved exactly as a bounded quadratic
+    programme. Any other goes to IPOPT [1]_ with the exact gradient and Hessian, restarted
+    with rescaled parameters until the cost no longer falls: its stopping test is relative
+    to the scaling, so one pass can stop a long way up a narrow valley.
+
+    Parameters
+    ----------
+    objective : Objective
+        The problem.
+    max_iterations : int
+        IPOPT iterations in each pass.
+
+    Returns
+    -------
+    Solution
+        With `converged` False and the reason in `status` where there is no minimum.
+
+    References
+    ----------
+    .. [1] A. Wächter, L. T. Biegler, Math. Program. 106, 25-57 (2006).
+    """
+    ended = early_end(objective, "casadi")
+    if ended is not None:
+        return ended
+    if objective.curve.is_linear and objective.loss == "linear":
+        return _solve_linear(objective)
+    return _solve_ipopt(objective, max_iterations)
+
+
+def _solve_ipopt(objective: Objective, max_iterations: int) -> Solution:
+    """Run IPOPT in units of the parameters' size, then of the steps that matter."""
+    solver = _ipopt(objective, max_iterations)
+    start = objective.start
+    best = Solution(
+        x=start,
+        cost=objective.cost(start),
+        converged=False,
+        status="not started",
+        solver="casadi/ipopt",
+        n_evaluations=0,
+    )
+    scale = objective.sizes(start)
+    count = 0
+    for attempt in range(8):
+        norm = best.cost if best.cost > 0.0 else 1.0
+        answer = solver(
+            x0=best.x / scale,
+            p=np.concatenate([objective.numbers, scale, [norm]]),
+            lbx=objective.low / scale,
+            ubx=objective.high / scale,
+        )
+        stats = solver.stats()
+        count += stats.get("n_call_nlp_f", 0)
+        x = np.clip(answer["x"].full().ravel() * scale, objective.low, objective.high)
+        previous = best
+        if np.isfinite(x).all():
+            x = _snapped(objective, x, scale)
+            status = _STATUS.get(
+                stats["return_status"], f"stopped: {stats['return_status']}"
+            )
+            found = replace(
+                best,
+                x=x,
+                cost=objective.cost(x),
+                converged=status.startswith("converged"),
+                status=status,
+            )
+            best = better(found, best)
+        if attempt > 0 and best.cost >= previous.cost * (1.0 - 1e-10):
+            break
+        scale = objective.step_sizes(best.x)
+    return replace(best, n_evaluations=count)
+
+
+def _snapped(objective: Objective, x: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Put a parameter on the bound it presses against; IPOPT stops a hair inside it."""
+    _, gradient = objective.cost_gradient(x)
+    on_low = (x - objective.low < 1e-6 * scale) & (gradient > 0.0)
+    on_high = (objective.high - x < 1e-6 * scale) & (gradient < 0.0)
+    snapped = np.where(on_low, objective.low, np.where(on_high, objective.high, x))
+    return snapped if objective.cost(snapped) <= objective.cost(x) else x
+
+
+def _ipopt(objective: Objective, max_iterations: int) -> "casadi.Function":
+    """Return the IPOPT solver of this curve and loss, built at the first use."""
+    import casadi
+
+    cache = _SOLVERS.setdefault(objective.curve, {})
+    key = f"{objective.loss} {max_iterations}"
+    if key not in cache:
+        expressions = objective.expressions
+        n = expressions.x.numel()
+        u, scale, norm = casadi.MX.sym("u", n), casadi.MX.sym("s", n), casadi.MX.sym("c")
+        cost, gauss_newton = casadi.substitute(
+            [expressions.cost, expressions.gauss_newton], [expressions.x], [u * scale]
+        )
+        p = casadi.vertcat(expressions.p, scale, norm)
+        options: dict[str, Any] = {**_IPOPT_OPTIONS, "ipopt.max_iter": max_iterations}
+        if not objective.curve.second_order:
+            weight, none = casadi.MX.sym("w"), casadi.MX.sym("g", 0)
+            hessian = weight / norm * gauss_newton * (scale @ scale.T)
+            options["hess_lag"] = casadi.Function(
+                "nlp_hess_l",
+                [u, p, weight, none],
+                [casadi.triu(hessian)],
+                ["x", "p", "lam_f", "lam_g"],
+                ["triu_hess_gamma_x_x"],
+            )
+        problem = {"x": u, "p": p, "f": cost / norm}
+        cache[key] = casadi.nlpsol("fit", "ipopt", problem, options)
+    return cache[key]
+
+
+def _solve_linear(objective: Objective) -> Solution:
+    """Solve min |A x - b| in the bounds: qpOASES for the active set, QR for the digits."""
+    import casadi
+
+    start = objective.start
+    prior_weight = 1.0 / np.array([p.prior_stderr for p in objective.parameters])
+    prior_value = np.array([p.prior_value for p in objective.parameters])
+    known = prior_weight > 0.0
+    matrix = np.vstack([objective.jacobian(start), np.diag(prior_weight)[known]])
+    target = matrix[: len(objective.data)] @ start - objective.residuals(start)
+    target = np.concatenate([target, (prior_weight * prior_value)[known]])
+    # Columns of unit length, or the normal equations lose half the digits twice
+    length = np.linalg.norm(matrix, axis=0)
+    length = np.where(length > 0.0, length, 1.0)
+    unit = matrix / length
+    hessian = casadi.DM(unit.T @ unit)
+    options: dict[str, Any] = {"printLevel": "none", "error_on_fail": False}
+    solver = casadi.conic("gains", "qpoases", {"h": hessian.sparsity()}, options)
+    low, high = objective.low * length, objective.high * length
+    answer = solver(h=hessian, g=-(unit.T @ target), lbx=low, ubx=high)
+    if not solver.stats()["success"]:
+        return Solution(
+            x=start,
+            cost=objective.cost(start),
+            converged=False,
+            status=f"stopped: {solver.stats()['return_status']}",
+            solver="casadi/qpoases",
+            n_evaluations=1,
+        )
+    y = np.clip(answer["x"].full().ravel(), low, high)
+    margin = 1e-9 * (1.0 + np.linalg.norm(target))
+    inside = (y - low > margin) & (high - y > margin)
+    y = np.where(inside, y, np.where(y - low <= high - y, low, high))
+    rest = target - unit[:, ~inside] @ y[~inside]
+    y[inside] = np.linalg.lstsq(unit[:, inside], rest, rcond=None)[0]
+    x = np.clip(y / length, objective.low, objective.high)
+    return Solution(
+        x=x,
+        cost=objective.cost(x),
+        converged=True,
+        status="converged",
+        solver="casadi/qpoases",
+        n_evaluations=1,
+    )

@@ -1,0 +1,240 @@
+"""The one statement of a fit: predicted curve, data, weights, bounds and prior knowledge.
+
+An objective knows its value and derivatives and no optimiser. With residuals
+r = (prediction(x) - data) / stderr it is
+
+    cost(x) = 1/2 sum rho(r^2) + 1/2 sum ((x - prior_value) / prior_stderr)^2,
+
+where rho(z) = z is least squares; other losses let outliers pull less [1]_.
+
+References
+----------
+.. [1] P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., 2009, chapter 7.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fitting.parameters import Parameter
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = ["LOSSES", "Curve", "Objective"]
+
+
+def _linear(z: Any) -> Any:
+    return z
+
+
+def _soft_l1(z: Any) -> Any:
+    import casadi
+
+    return 2.0 * (casadi.sqrt(1.0 + z) - 1.0)
+
+
+def _huber(z: Any) -> Any:
+    import casadi
+
+    # 1.345 keeps 95 % efficiency on Gaussian noise
+    bend = 1.345
+    beyond = casadi.sqrt(casadi.fmax(z, bend**2)) - bend
+    return casadi.fmin(z, bend**2) + 2.0 * bend * beyond
+
+
+def _cauchy(z: Any) -> Any:
+    import casadi
+
+    # 2.385 keeps 95 % efficiency on Gaussian noise
+    return 2.385**2 * casadi.log1p(z / 2.385**2)
+
+
+LOSSES: dict[str, Callable[[Any], Any]] = {
+    "linear": _linear,
+    "huber": _huber,
+    "soft_l1": _soft_l1,
+    "cauchy": _cauchy,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A predicted curve y(x) with derivatives, shared by all objectives built on it.
+
+    Parameters
+    ----------
+    function : casadi.Function
+        Maps x (n) to y (m).
+    second_order : bool
+        False if the function has first derivatives only, as a wrapped simulation.
+    """
+
+    function: "casadi.Function"
+    second_order: bool = True
+
+    @cached_property
+    def jacobian(self) -> "casadi.Function":
+        """The casadi function x -> dy/dx, shape (m, n)."""
+        import casadi
+
+        x = casadi.MX.sym("x", self.function.size1_in(0))
+        return casadi.Function("jacobian", [x], [casadi.jacobian(self.function(x), x)])
+
+    @cached_property
+    def is_linear(self) -> bool:
+        """True if y is an affine function of x, so the fit needs no search."""
+        import casadi
+
+        if not self.second_order:
+            return False
+        x = casadi.MX.sym("x", self.function.size1_in(0))
+        jacobian = casadi.jacobian(self.function(x), x)
+        return not casadi.depends_on(jacobian, x)
+
+    # The cache belongs to the curve and dies with it
+    @cached_property
+    def expressions(self) -> "Callable[[str], Expressions]":
+        """Symbolic cost of this curve for a loss, built once for each loss."""
+        return lru_cache(maxsize=None)(lambda loss: Expressions(self, loss))
+
+
+class Expressions:
+    """Cost of a curve as a casadi expression of x and of the numbers p it depends on.
+
+    Attributes
+    ----------
+    x, p, cost : casadi.MX
+        p stacks data (m), 1/stderr (m), prior values (n) and 1/prior_stderr (n).
+    value_gradient : casadi.Function
+        (x, p) -> (cost, gradient).
+    gauss_newton : casadi.MX
+        J^T D J with D = rho'(r^2), the Hessian without the curvature of the model.
+    """
+
+    def __init__(self, curve: Curve, loss: str) -> None:
+        import casadi
+
+        m, n = curve.function.size1_out(0), curve.function.size1_in(0)
+        self.x = casadi.MX.sym("x", n)
+        self.p = casadi.MX.sym("p", 2 * m + 2 * n)
+        data, weight = self.p[:m], self.p[m : 2 * m]
+        prior, prior_weight = self.p[2 * m : 2 * m + n], self.p[2 * m + n :]
+        residual = weight * (curve.function(self.x) - data)
+        penalty = prior_weight * (self.x - prior)
+
+        rho = LOSSES[loss]
+        self.cost = 0.5 * casadi.sum1(rho(residual**2)) + 0.5 * casadi.sumsqr(penalty)
+        gradient = casadi.gradient(self.cost, self.x)
+        arguments = [self.x, self.p]
+        self.value_gradient = casadi.Function("cost", arguments, [self.cost, gradient])
+
+        z = casadi.MX.sym("z")
+        slope = casadi.Function("slope", [z], [casadi.gradient(rho(z), z)])
+        bend = casadi.sqrt(casadi.fmax(slope.map(m)((residual**2).T).T, 0.0))
+        jacobian = casadi.repmat(bend * weight, 1, n) * curve.jacobian(self.x)
+        self.gauss_newton = jacobian.T @ jacobian + casadi.diag(prior_weight**2)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Objective:
+    """A curve to be brought to data.
+
+    Parameters
+    ----------
+    curve : Curve
+        Prediction of the m data from the n parameters.
+    data, stderr : ndarray, shape (m,)
+        Measured values and their standard errors, finite and stderr > 0.
+    parameters : sequence of Parameter
+        In the order of the curve's argument.
+    loss : str
+        A key of `LOSSES`.
+    """
+
+    curve: Curve
+    data: np.ndarray
+    stderr: np.ndarray
+    parameters: Sequence[Parameter]
+    loss: str = "linear"
+
+    def __post_init__(self) -> None:
+        if self.loss not in LOSSES:
+            known = ", ".join(LOSSES)
+            msg = f"loss must be one of {known}, got {self.loss!r}. Usual is 'linear'."
+            raise ValueError(msg)
+
+    @property
+    def start(self) -> np.ndarray:
+        """Where the search begins, shape (n,)."""
+        return np.array([parameter.value for parameter in self.parameters])
+
+    @property
+    def low(self) -> np.ndarray:
+        """Lower bounds, shape (n,)."""
+        return np.array([parameter.low for parameter in self.parameters])
+
+    @property
+    def high(self) -> np.ndarray:
+        """Upper bounds, shape (n,)."""
+        return np.array([parameter.high for parameter in self.parameters])
+
+    @cached_property
+    def numbers(self) -> np.ndarray:
+        """The p of `Expressions`: data, weights and priors of this objective."""
+        prior = [parameter.prior_value for parameter in self.parameters]
+        prior_stderr = np.array([parameter.prior_stderr for parameter in self.parameters])
+        return np.concatenate([self.data, 1.0 / self.stderr, prior, 1.0 / prior_stderr])
+
+    @property
+    def expressions(self) -> Expressions:
+        """The symbolic cost, for solvers that want to differentiate it themselves."""
+        return self.curve.expressions(self.loss)
+
+    def cost(self, x: np.ndarray) -> float:
+        """Return the cost at x; inf where the curve is not finite."""
+        return self.cost_gradient(x)[0]
+
+    def cost_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the cost and its exact gradient at x, shape (n,)."""
+        value, gradient = self.expressions.value_gradient(x, self.numbers)
+        cost = float(value)
+        return (cost if np.isfinite(cost) else np.inf), gradient.full().ravel()
+
+    def predict(self, x: np.ndarray) -> np.ndarray:
+        """Return the predicted curve at x, shape (m,)."""
+        return self.curve.function(x).full().ravel()
+
+    def residuals(self, x: np.ndarray) -> np.ndarray:
+        """Return (prediction - data) / stderr at x, shape (m,), priors left out."""
+        return (self.predict(x) - self.data) / self.stderr
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Return d residuals / dx at x, shape (m, n), priors left out."""
+        return self.curve.jacobian(x).full() / self.stderr[:, None]
+
+    def sizes(self, x: np.ndarray) -> np.ndarray:
+        """Return the parameters' own size, or their natural scale where they are 0."""
+        natural = np.array([parameter.scale for parameter in self.parameters])
+        return np.where(x == 0.0, natural, np.abs(x))
+
+    def step_sizes(self, x: np.ndarray) -> np.ndarray:
+        """Return the change of each parameter that alone changes the fit by its misfit.
+
+        Where a parameter has no effect, or the Jacobian is not finite, its own size.
+        """
+        with np.errstate(all="ignore"):
+            curvature = np.linalg.norm(self.jacobian(x), axis=0)
+            step = np.sqrt(2.0 * self.cost(x)) / curvature
+        return np.where(np.isfinite(step) & (step > 0.0), step, self.sizes(x))
+
+    def with_data(self, data: np.ndarray, stderr: np.ndarray) -> "Objective":
+        """Return the objective for other data or weights on the same curve."""
+        return replace(self, data=data, stderr=stderr)
+
+    def with_parameters(self, parameters: Sequence[Parameter]) -> "Objective":
+        """Return the objective with other starts or bounds."""
+        return replace(self, parameters=tuple(parameters))
