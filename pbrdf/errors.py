@@ -105,3 +105,7 @@ def require(
         msg = f"{name} must {rule}, got {value:.17g}{place}. {cure}"
         raise ValueError(msg)
     return array
+
+
+class AccuracyWarning(UserWarning):
+    """A result that stands on weaker ground than its user may think."""

@@ -1,0 +1,114 @@
+"""Directions, frames and the one table of result variables (the conventions page in code)."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+STOKES = ("I", "Q", "U", "V")
+BOUNCES = ("1", "2", "3+")
+
+
+class Variable(NamedTuple):
+    """What a result variable is: its units, its name in words and its dimensions."""
+
+    units: str
+    long_name: str
+    dims: tuple[str, ...]
+
+
+_BINS = ("theta_s", "dphi")
+_MUELLER = (*_BINS, "stokes_out", "stokes_in")
+
+RESULT_VARIABLES: dict[str, Variable] = {
+    "brdf": Variable(
+        "sr-1", "Mueller BRDF by number of bounces", ("bounces", "theta_i", "wavelength", *_MUELLER)
+    ),
+    "brdf_stderr": Variable(
+        "sr-1", "standard error of brdf", ("bounces", "theta_i", "wavelength", *_MUELLER)
+    ),
+    "brdf_total": Variable(
+        "sr-1", "Mueller BRDF of all bounces", ("theta_i", "wavelength", *_MUELLER)
+    ),
+    "brdf_total_stderr": Variable(
+        "sr-1", "standard error of brdf_total", ("theta_i", "wavelength", *_MUELLER)
+    ),
+    "albedo": Variable(
+        "1", "directional-hemispherical reflectance by number of bounces",
+        ("bounces", "theta_i", "wavelength"),
+    ),
+    "albedo_stderr": Variable(
+        "1", "standard error of albedo", ("bounces", "theta_i", "wavelength")
+    ),
+    "projected_solid_angle": Variable("sr", "integral of cos(theta_s) over the bin", _BINS),
+    "absorbed": Variable("1", "share of the light absorbed", ("theta_i", "wavelength")),
+    "transmitted": Variable("1", "share of the light transmitted", ("theta_i", "wavelength")),
+    "truncated": Variable(
+        "1", "share of the light still travelling at the bounce limit", ("theta_i", "wavelength")
+    ),
+    "leaked": Variable("1", "share of the light lost by a fault", ("theta_i", "wavelength")),
+    "side_exits": Variable(
+        "1", "share of the rays that left a finite map sideways, not counted", ("theta_i",)
+    ),
+    "theta_i": Variable("rad", "zenith angle of the source", ("theta_i",)),
+    "theta_s": Variable("rad", "zenith angle of the detector, bin centre", ("theta_s",)),
+    "dphi": Variable("rad", "azimuth of the detector from the source, bin centre", ("dphi",)),
+    "wavelength": Variable("um", "vacuum wavelength", ("wavelength",)),
+    "bounces": Variable("1", "number of bounces", ("bounces",)),
+    "stokes_out": Variable("1", "Stokes element of the scattered light", ("stokes_out",)),
+    "stokes_in": Variable("1", "Stokes element of the incident light", ("stokes_in",)),
+}  # fmt: skip
+
+
+def direction(theta: npt.ArrayLike, phi: npt.ArrayLike) -> np.ndarray:
+    """Unit vector that leaves the surface at zenith theta and azimuth phi, shape (..., 3).
+
+    Examples
+    --------
+    >>> direction(np.pi / 2, 0.0).round(12) + 0.0
+    array([1., 0., 0.])
+    """
+    theta, phi = np.broadcast_arrays(theta, phi)
+    sin_theta = np.sin(theta)
+    return np.stack([sin_theta * np.cos(phi), sin_theta * np.sin(phi), np.cos(theta)], axis=-1)
+
+
+def meridian_frame(
+    prop: npt.ArrayLike, phi: npt.ArrayLike = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Frame (e_s, e_p) of a beam along the unit vector `prop`, shapes (..., 3).
+
+    e_s = z x k / |z x k| and e_p = k x e_s. For k along the z axis `phi` is the azimuth of the
+    propagation vector whose limit is taken.
+
+    Examples
+    --------
+    >>> e_s, e_p = meridian_frame([1.0, 0.0, 0.0])
+    >>> e_s, e_p
+    (array([0., 1., 0.]), array([0., 0., 1.]))
+    """
+    k = np.asarray(prop, dtype=np.float64)
+    azimuth = np.where(np.hypot(k[..., 0], k[..., 1]) > 0.0, np.arctan2(k[..., 1], k[..., 0]), phi)
+    e_s = np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)], axis=-1)
+    return e_s, np.cross(k, e_s)
+
+
+def detector_bins(n_theta: int, n_dphi: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Bin centres theta_s (n_theta,), dphi (n_dphi,) [rad] and ∫cosθ dΩ (n_theta, n_dphi) [sr].
+
+    Zenith bins are equal in angle over [0, π/2]; azimuth bins are equal over the circle and
+    centred on 0 and π.
+
+    Examples
+    --------
+    >>> theta_s, dphi, weight = detector_bins(45, 90)
+    >>> bool(np.isclose(weight.sum(), np.pi))
+    True
+    """
+    edges = np.linspace(0.0, np.pi / 2, n_theta + 1)
+    theta_s = 0.5 * (edges[1:] + edges[:-1])
+    dphi = np.arange(n_dphi) * (2 * np.pi / n_dphi)
+    # ∫ cos sin dθ = sin(θ2 - θ1) sin(θ2 + θ1) / 2, which does not cancel
+    ring = 0.5 * np.sin(np.diff(edges)) * np.sin(edges[1:] + edges[:-1])
+    weight = np.broadcast_to(ring[:, None] * (2 * np.pi / n_dphi), (n_theta, n_dphi))
+    return theta_s, dphi, weight.copy()

@@ -1,0 +1,102 @@
+"""Result datasets: labelled axes, units from the one table, the whole scene as attributes."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import pbrdf
+from pbrdf.conventions import BOUNCES, RESULT_VARIABLES, STOKES, detector_bins
+from pbrdf.kernels.transport import (
+    ABSORBED,
+    LEAKED,
+    N_ESCAPED,
+    N_LEAKED,
+    N_SEGMENTS,
+    N_SIDE,
+    N_TRUNCATED,
+    TRUNCATED,
+)
+from pbrdf.scene import Scene
+from pbrdf.surface import HeightMap
+from pbrdf.tracer.plan import Moments
+
+
+def to_dataset(
+    moments: Moments, scene: Scene, *, wavelength: np.ndarray | None, attrs: dict[str, Any]
+) -> xr.Dataset:
+    """Normalise tallies to a Mueller BRDF and label every axis."""
+    plan = moments.plan
+    theta_s, dphi, weight = detector_bins(plan.n_theta, plan.n_dphi)
+    counts = moments.counts
+    rays = plan.n_rays * moments.samples
+    per_weight = 1.0 / weight[:, :, None, None]
+
+    def by_bounces(flux: np.ndarray) -> np.ndarray:
+        # (theta_i, wavelength, bounces, ...) to (bounces, theta_i, wavelength, ...)
+        return np.moveaxis(flux, 2, 0) * per_weight
+
+    mean, stderr = moments.flux()
+    total, total_stderr = moments.flux_total()
+    albedo, albedo_stderr = moments.albedo()
+    energy = moments.energy()
+    arrays = {
+        "brdf": by_bounces(mean),
+        "brdf_stderr": by_bounces(stderr),
+        "brdf_total": total * per_weight,
+        "brdf_total_stderr": total_stderr * per_weight,
+        "albedo": np.moveaxis(albedo, 2, 0),
+        "albedo_stderr": np.moveaxis(albedo_stderr, 2, 0),
+        "projected_solid_angle": weight,
+        "absorbed": energy[..., ABSORBED],
+        "transmitted": np.zeros(energy.shape[:2]),
+        "truncated": energy[..., TRUNCATED],
+        "leaked": energy[..., LEAKED],
+        "side_exits": counts[:, N_SIDE] / rays,
+    }
+    coords: dict[str, Any] = {
+        "bounces": list(BOUNCES),
+        "theta_i": plan.theta_i,
+        "theta_s": theta_s,
+        "dphi": dphi,
+        "stokes_out": list(STOKES[: plan.n_stokes]),
+        "stokes_in": list(STOKES[: plan.n_stokes]),
+    }
+    spectral = wavelength is not None and wavelength.ndim == 1
+    if wavelength is not None:
+        coords["wavelength"] = wavelength if spectral else float(wavelength)
+
+    data: dict[str, Any] = {}
+    for name, array in arrays.items():
+        dims = RESULT_VARIABLES[name].dims
+        if "wavelength" in dims and not spectral:
+            array = array.squeeze(dims.index("wavelength"))
+            dims = tuple(d for d in dims if d != "wavelength")
+        data[name] = (dims, array)
+    dataset = xr.Dataset(data, coords)
+    for name in dataset.variables:
+        entry = RESULT_VARIABLES[str(name)]
+        dataset[name].attrs = {"units": entry.units, "long_name": entry.long_name}
+
+    dataset.attrs = attrs | {
+        "version": pbrdf.__version__,
+        "scene": _scene_text(scene),
+        "rays_per_direction": rays,
+        "path_segments": int(counts[:, N_SEGMENTS].sum()),
+        "rays_escaped": counts[:, N_ESCAPED].tolist(),
+        "rays_truncated": counts[:, N_TRUNCATED].tolist(),
+        "rays_leaked": counts[:, N_LEAKED].tolist(),
+        "rays_left_sideways": counts[:, N_SIDE].tolist(),
+        "rel_error": moments.rel_error(),
+    }
+    return dataset
+
+
+def _scene_text(scene: Scene) -> str:
+    """TOML of the scene; a large map is described instead of written out."""
+    try:
+        return scene.to_toml()
+    except ValueError:
+        surface = scene.surface
+        assert isinstance(surface, HeightMap)  # noqa: S101
+        return f"# {surface!r}, height rms {np.std(surface.heights):.6g} um"

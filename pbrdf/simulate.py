@@ -1,0 +1,337 @@
+"""Monte Carlo prediction of the Mueller BRDF of a scene: section 3 of the paper."""
+
+import os
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from pbrdf.errors import AccuracyWarning, require
+from pbrdf.results import to_dataset
+from pbrdf.scene import Scene
+from pbrdf.surface import GaussianSurface, HeightMap
+from pbrdf.tracer.field import Field
+from pbrdf.tracer.plan import Moments, Plan, Tally, trace_sample
+from pbrdf.validity import geometric_optics_warnings
+
+STOKES_COUNT = {"full": 4, "linear": 3, "unpolarized": 1}
+# A fixed surface has no realisations; its rays are dealt to this many independent batches
+BATCHES = 32
+# Below this many realisations the standard errors themselves are too uncertain
+FEW_REALIZATIONS = 8
+# Where a run towards a target error gives up
+MAX_SAMPLES = 4096
+
+
+def simulate(
+    scene: Scene,
+    theta_i: npt.ArrayLike,
+    *,
+    phi_i: float | str = 0.0,
+    n_rays: int = 100_000,
+    realizations: int = 1,
+    seed: int | None = 0,
+    max_bounces: int = 64,
+    target_rel_error: float | None = None,
+    wavelength: npt.ArrayLike | None = None,
+    n_theta: int = 45,
+    n_dphi: int = 90,
+    stokes: str = "full",
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> xr.Dataset:
+    """Trace light from the source to the hemisphere and bin it as Mueller BRDF.
+
+    Parameters
+    ----------
+    scene : Scene
+        Surface and substrate.
+    theta_i : array_like, shape () or (angles,)
+        Zenith angle of the source, in [0, π/2). [rad]
+    phi_i : float or "uniform"
+        Azimuth of the source [rad]; "uniform" averages over it, as suits an isotropic surface.
+    n_rays : int
+        Rays an incident direction and realisation.
+    realizations : int
+        Surfaces drawn from a GaussianSurface; a HeightMap is traced with this many times
+        n_rays. With `target_rel_error` it is the least number.
+    seed : int or None
+        Makes the run reproducible bit for bit, for any number of workers; None draws one.
+    max_bounces : int
+        Paths are cut after so many bounces; what they still carry is `truncated`.
+    target_rel_error : float, optional
+        Add samples until the largest stderr / M00 over the bins above a tenth of the peak
+        falls below this; the dataset says what was reached.
+    wavelength : array_like, optional
+        Vacuum wavelength, scalar or (wavelengths,); needed by tabulated materials. [um]
+    n_theta, n_dphi : int
+        Detector bins in zenith and azimuth; n_dphi is even.
+    stokes : {"full", "linear", "unpolarized"}
+        Stokes elements to compute: all, without V, or M00 alone.
+    workers : int, optional
+        Threads; all cores by default. Does not change the result.
+    progress : callable, optional
+        Called with (samples done, samples in all).
+
+    Returns
+    -------
+    xarray.Dataset
+        `brdf` [sr^-1] and `brdf_stderr` (bounces, theta_i, [wavelength], theta_s, dphi,
+        stokes_out, stokes_in), `brdf_total` for all bounces, `albedo`, the energy budget and
+        `projected_solid_angle`; see `pbrdf.conventions.RESULT_VARIABLES`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is out of its range.
+
+    Warns
+    -----
+    AccuracyWarning
+        If realisations are too few for honest standard errors, or geometric optics fails at
+        the wavelength.
+
+    Notes
+    -----
+    A bin holds flux / (incident flux ∫cosθ dΩ). Standard errors come from independent
+    surface realisations, or from 32 or more batches of rays where the surface is fixed.
+
+    Examples
+    --------
+    >>> from pbrdf import HeightMap, Material
+    >>> scene = Scene(HeightMap.flat(size=(1.0, 1.0)), Material(1.5))
+    >>> result = simulate(scene, 0.0, n_rays=320)
+    >>> round(float(result.albedo.sel(bounces="1").item()), 6)
+    0.04
+    """
+    surface, fixed = scene.surface, isinstance(scene.surface, HeightMap)
+    rays = _count("n_rays", n_rays, BATCHES)
+    drawn = _count("realizations", realizations, 1)
+    batched = fixed or drawn == 1
+    samples = max(BATCHES, drawn) if batched else drawn
+    angles = _angles(theta_i)
+    waves = _wavelengths(wavelength)
+    plan = Plan(
+        theta_i=angles,
+        phi_i=_azimuth(phi_i),
+        n_rays=-(-rays * drawn // samples) if batched else rays,
+        max_bounces=_count("max_bounces", max_bounces, 1),
+        n=_index(scene, waves)[0],
+        kappa=_index(scene, waves)[1],
+        n_stokes=_stokes_count(stokes),
+        n_theta=_count("n_theta", n_theta, 1),
+        n_dphi=_even("n_dphi", n_dphi),
+    )
+    target = None if target_rel_error is None else _target(target_rel_error)
+    _check_scene(scene)
+    notes = _warnings(scene, angles, waves, drawn)
+    for note in notes:
+        warnings.warn(note, AccuracyWarning, stacklevel=2)
+
+    root = np.random.SeedSequence(seed)
+    if batched:
+        # The surface, or the one realisation asked for, stays the same in all batches
+        shared = surface if isinstance(surface, HeightMap) else surface.sample(root.spawn(1)[0])
+        draw = partial(_trace_fixed, Field.of(shared), plan)
+    else:
+        assert isinstance(surface, GaussianSurface)  # noqa: S101
+        draw = partial(_trace_realization, surface, plan)
+
+    moments = Moments(plan)
+    limit = samples if target is None else max(samples, MAX_SAMPLES)
+    least = samples if batched else min(samples, limit)
+    for tally in _in_order(draw, root, limit, _workers(workers)):
+        moments.add(tally)
+        if progress is not None:
+            progress(moments.samples, samples if target is None else limit)
+        if target is not None and moments.samples >= max(least, 2):
+            if moments.rel_error() <= target:
+                break
+    return to_dataset(
+        moments,
+        scene,
+        wavelength=waves,
+        attrs={
+            "seed": int(root.entropy),  # type: ignore[arg-type]
+            "n_rays": rays,
+            "realizations": 1 if batched else moments.samples,
+            "ray_batches": moments.samples if batched else 0,
+            "stderr_excludes_surface": batched,
+            "max_bounces": plan.max_bounces,
+            "stokes": stokes,
+            "phi_i": "uniform" if plan.phi_i is None else plan.phi_i,
+            "target_rel_error": np.nan if target is None else target,
+            "warnings": notes,
+        },
+    )
+
+
+def _trace_fixed(field: Field, plan: Plan, seed: np.random.SeedSequence) -> Tally:
+    return trace_sample(field, plan, seed)
+
+
+def _trace_realization(
+    surface: GaussianSurface, plan: Plan, seed: np.random.SeedSequence
+) -> Tally:
+    heights, rays = seed.spawn(2)
+    return trace_sample(Field.of(surface.sample(heights)), plan, rays)
+
+
+def _in_order(
+    draw: Callable[[np.random.SeedSequence], Tally],
+    root: np.random.SeedSequence,
+    samples: int,
+    workers: int,
+) -> Iterator[Tally]:
+    """Tallies of the samples in their order, computed a few ahead by threads."""
+    with ThreadPoolExecutor(workers) as pool:
+        pending: deque[Future[Tally]] = deque()
+        submitted = 0
+        try:
+            while submitted < samples or pending:
+                while submitted < samples and len(pending) < 2 * workers:
+                    pending.append(pool.submit(draw, root.spawn(1)[0]))
+                    submitted += 1
+                yield pending.popleft().result()
+        finally:
+            for future in pending:
+                future.cancel()
+
+
+def _angles(theta_i: npt.ArrayLike) -> np.ndarray:
+    angles = np.atleast_1d(
+        require(
+            "theta_i",
+            theta_i,
+            lambda v: (v >= 0) & (v < np.pi / 2),
+            "lie in [0, 1.571) rad",
+            "Angles are radians; use np.deg2rad.",
+        )
+    )
+    if angles.ndim != 1 or angles.size == 0:
+        msg = f"theta_i must be a number or one-dimensional [rad], got shape {angles.shape}."
+        raise ValueError(msg)
+    return angles
+
+
+def _wavelengths(wavelength: npt.ArrayLike | None) -> np.ndarray | None:
+    if wavelength is None:
+        return None
+    waves = require(
+        "wavelength",
+        wavelength,
+        lambda v: (v > 0) & np.isfinite(v),
+        "be positive [um]",
+        "Wavelengths are micrometres.",
+    )
+    if waves.ndim > 1 or waves.size == 0:
+        msg = f"wavelength must be a number or one-dimensional [um], got shape {waves.shape}."
+        raise ValueError(msg)
+    return waves
+
+
+def _azimuth(phi_i: float | str) -> float | None:
+    if isinstance(phi_i, str):
+        if phi_i != "uniform":
+            msg = f'phi_i must be an angle [rad] or "uniform", got {phi_i!r}.'
+            raise ValueError(msg)
+        return None
+    value = require("phi_i", phi_i, np.isfinite, "be finite [rad]", 'Or pass "uniform".')
+    if value.ndim > 0:
+        msg = f"phi_i must be one angle [rad], got shape {value.shape}. Run once for each."
+        raise ValueError(msg)
+    return float(value)
+
+
+def _count(name: str, value: int, least: int) -> int:
+    number = require(
+        name,
+        value,
+        lambda v: (v >= least) & (v == np.floor(v)) & (v < 2**53),
+        f"be a whole number of at least {least}",
+        "Counts are whole numbers.",
+    )
+    return int(number)
+
+
+def _even(name: str, value: int) -> int:
+    number = _count(name, value, 2)
+    if number % 2:
+        msg = f"{name} must be even, got {number}. Bins are centred on 0 and on pi."
+        raise ValueError(msg)
+    return number
+
+
+def _stokes_count(stokes: str) -> int:
+    if stokes not in STOKES_COUNT:
+        msg = f"stokes must be one of {', '.join(STOKES_COUNT)}, got {stokes!r}."
+        raise ValueError(msg)
+    return STOKES_COUNT[stokes]
+
+
+def _target(value: float) -> float:
+    return float(
+        require(
+            "target_rel_error",
+            value,
+            lambda v: (v > 0) & (v < 1),
+            "lie in (0, 1) [1]",
+            "0.01 asks for 1 %.",
+        )
+    )
+
+
+def _workers(workers: int | None) -> int:
+    if workers is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    return _count("workers", workers, 1)
+
+
+def _index(scene: Scene, waves: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    n, kappa = scene.substrate.indices(waves)
+    n, kappa = np.broadcast_arrays(np.atleast_1d(n), np.atleast_1d(kappa))
+    if waves is not None and waves.ndim == 1:
+        n, kappa = np.broadcast_to(n, waves.shape), np.broadcast_to(kappa, waves.shape)
+    return np.ascontiguousarray(n), np.ascontiguousarray(kappa)
+
+
+def _check_scene(scene: Scene) -> None:
+    if scene.substrate.diffuse_albedo > 0.0:
+        msg = (
+            f"diffuse_albedo of the substrate must be 0 in this version, got "
+            f"{scene.substrate.diffuse_albedo:g}. Add a Lambertian term to the result instead."
+        )
+        raise ValueError(msg)
+    if isinstance(scene.surface, HeightMap) and scene.surface.missing > 0.0:
+        msg = (
+            f"heights must be complete to be traced, got {100 * scene.surface.missing:.2g} % "
+            "missing. Fill the holes with HeightMap.filled()."
+        )
+        raise ValueError(msg)
+
+
+def _warnings(
+    scene: Scene, angles: np.ndarray, waves: np.ndarray | None, drawn: int
+) -> list[str]:
+    notes: list[str] = []
+    surface = scene.surface
+    if isinstance(surface, GaussianSurface):
+        if drawn == 1:
+            notes.append(
+                "One realisation of a random surface: standard errors hold for this surface "
+                "only. Ask for 16 realizations or more."
+            )
+        elif drawn < FEW_REALIZATIONS:
+            notes.append(
+                f"{drawn} realizations are too few for honest standard errors; "
+                "ask for 16 or more."
+            )
+        if waves is not None:
+            for wave in np.atleast_1d(waves):
+                notes += geometric_optics_warnings(surface, angles, float(wave))
+    return notes

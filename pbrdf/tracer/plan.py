@@ -1,0 +1,156 @@
+"""What is traced over one surface sample, and the tally that comes back."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbrdf.conventions import BOUNCES, detector_bins
+from pbrdf.kernels import transport
+from pbrdf.kernels.moments import add_sample
+from pbrdf.tracer.field import Field
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Incident directions, materials and bins of a run; the same for every sample.
+
+    Attributes
+    ----------
+    theta_i : ndarray, shape (angles,)
+        Zenith angles of the source. [rad]
+    phi_i : float or None
+        Azimuth of the source; None spreads it evenly over the circle. [rad]
+    n_rays, max_bounces : int
+        Rays an incident direction and sample, and where their paths are cut.
+    n, kappa : ndarray, shape (wavelengths,)
+        Index of the substrate. [1]
+    n_stokes : int
+        4 for (I, Q, U, V), 3 without V, 1 for I alone.
+    n_theta, n_dphi : int
+        Detector bins.
+    """
+
+    theta_i: np.ndarray
+    phi_i: float | None
+    n_rays: int
+    max_bounces: int
+    n: np.ndarray
+    kappa: np.ndarray
+    n_stokes: int
+    n_theta: int
+    n_dphi: int
+
+    @property
+    def tally_shape(self) -> tuple[int, ...]:
+        """Shape (angles, wavelengths, bounces, n_theta, n_dphi, stokes, stokes)."""
+        return (
+            len(self.theta_i), len(self.n), len(BOUNCES),
+            self.n_theta, self.n_dphi, self.n_stokes, self.n_stokes,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tally:
+    """Flux, energy and counts of one sample, per incident direction.
+
+    `flux` has the shape of the plan and is not normalised; `energy` (angles, wavelengths, 3)
+    is what was absorbed, truncated and leaked; `counts` (angles, 5) as in the transport kernel.
+    """
+
+    flux: np.ndarray
+    energy: np.ndarray
+    counts: np.ndarray
+
+
+def trace_sample(field: Field, plan: Plan, seed: np.random.SeedSequence) -> Tally:
+    """Trace every incident direction of the plan over one surface.
+
+    Releases the interpreter lock; the streams belong to the sample, so the result does not
+    depend on how samples are spread over threads.
+    """
+    tally = Tally(
+        flux=np.zeros(plan.tally_shape),
+        energy=np.zeros((len(plan.theta_i), len(plan.n), 3)),
+        counts=np.zeros((len(plan.theta_i), 5), dtype=np.int64),
+    )
+    shifts = np.random.default_rng(seed).random((len(plan.theta_i), 3))
+    for index, theta in enumerate(plan.theta_i):
+        transport.trace_batch(
+            field.heights, field.maxima, field.levels, field.z_top, field.periodic,
+            field.pitch[0], field.pitch[1],
+            field.entry_rectangle(theta, plan.phi_i),
+            np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
+            plan.n_rays, shifts[index], plan.max_bounces,
+            plan.n, plan.kappa, plan.n_stokes,
+            tally.flux[index], tally.energy[index], tally.counts[index],
+        )  # fmt: skip
+    return tally
+
+
+class Moments:
+    """Mean and standard error over samples, added in a fixed order."""
+
+    def __init__(self, plan: Plan) -> None:
+        shape = plan.tally_shape
+        self.plan = plan
+        self.samples = 0
+        self.counts = np.zeros((shape[0], 5), dtype=np.int64)
+        self._mean = np.zeros(shape)
+        self._scatter = np.zeros(shape)
+        self._mean_total = np.zeros(shape[:2] + shape[3:])
+        self._scatter_total = np.zeros(shape[:2] + shape[3:])
+        self._albedo: list[np.ndarray] = []
+        self._energy: list[np.ndarray] = []
+
+    def add(self, tally: Tally) -> None:
+        """Add one sample."""
+        self.samples += 1
+        self.counts += tally.counts
+        angles, wavelengths, orders = tally.flux.shape[:3]
+        # Rays that left a finite map sideways count in neither part of the fraction
+        counted = self.plan.n_rays - tally.counts[:, transport.N_SIDE]
+        scale = 1.0 / np.maximum(counted, 1)
+        for a in range(angles):
+            add_sample(
+                tally.flux[a].reshape(wavelengths, orders, -1), scale[a], self.samples,
+                self._mean[a].reshape(wavelengths, orders, -1),
+                self._scatter[a].reshape(wavelengths, orders, -1),
+                self._mean_total[a].reshape(wavelengths, -1),
+                self._scatter_total[a].reshape(wavelengths, -1),
+            )  # fmt: skip
+        self._albedo.append(tally.flux[..., 0, 0].sum(axis=(3, 4)) * scale[:, None, None])
+        self._energy.append(tally.energy * scale[:, None, None])
+
+    def _stderr(self, scatter: np.ndarray) -> np.ndarray:
+        if self.samples < 2:
+            return np.full_like(scatter, np.nan)
+        return np.sqrt(scatter / (self.samples - 1) / self.samples)
+
+    def flux(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean flux by bounces and its standard error, in the shape of the plan."""
+        return self._mean, self._stderr(self._scatter)
+
+    def flux_total(self) -> tuple[np.ndarray, np.ndarray]:
+        """The same for all bounces together."""
+        return self._mean_total, self._stderr(self._scatter_total)
+
+    def albedo(self) -> tuple[np.ndarray, np.ndarray]:
+        """Albedo (angles, wavelengths, bounces) and its standard error."""
+        values = np.array(self._albedo)
+        if self.samples < 2:
+            return values.mean(axis=0), np.full(values.shape[1:], np.nan)
+        return values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(self.samples)
+
+    def energy(self) -> np.ndarray:
+        """Mean energy absorbed, truncated and leaked (angles, wavelengths, 3)."""
+        return np.mean(self._energy, axis=0)
+
+    def rel_error(self) -> float:
+        """Largest standard error over M00 of the bins above a tenth of the peak."""
+        mean, stderr = self.flux_total()
+        _, _, weight = detector_bins(self.plan.n_theta, self.plan.n_dphi)
+        m00 = mean[..., 0, 0] / weight
+        bright = m00 > 0.1 * m00.max(axis=(2, 3), keepdims=True)
+        if not bright.any():
+            return 0.0
+        return float(np.max(stderr[..., 0, 0][bright] / mean[..., 0, 0][bright]))
