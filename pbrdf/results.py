@@ -7,7 +7,7 @@ import xarray as xr
 
 import pbrdf
 from pbrdf.conventions import BOUNCES, RESULT_VARIABLES, STOKES, detector_bins
-from pbrdf.kernels.transport import (
+from pbrdf.kernels.shading import (
     ABSORBED,
     LEAKED,
     N_ESCAPED,

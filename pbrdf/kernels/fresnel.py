@@ -74,10 +74,19 @@ def elements_from_wave(cos_beta, sin2_beta, excess_re, excess_im, q_re, q_im):
 
 @jit
 def facet_elements(cos_beta, sin2_beta, n, kappa):
-    """Elements A, B, C, D for any finite N, given cos and sin^2 each to full accuracy."""
-    q_re, q_im = wave_normal(cos_beta, n, kappa)
-    excess_re = (n - 1.0) * (n + 1.0) - kappa * kappa
-    return elements_from_wave(cos_beta, sin2_beta, excess_re, 2.0 * n * kappa, q_re, q_im)
+    """Elements A, B, C, D without a branch, from cos and sin^2 each to full accuracy."""
+    perfect = n == inf
+    index = select(perfect, 1.0, n)
+    q_re, q_im = wave_normal(cos_beta, index, kappa)
+    excess_re = (index - 1.0) * (index + 1.0) - kappa * kappa
+    excess_im = 2.0 * index * kappa
+    a, b, c, d = elements_from_wave(cos_beta, sin2_beta, excess_re, excess_im, q_re, q_im)
+    return (
+        select(perfect, 1.0, a),
+        select(perfect, 0.0, b),
+        select(perfect, -1.0, c),
+        select(perfect, 0.0, d),
+    )
 
 
 @jit

@@ -1,8 +1,7 @@
-"""Mueller transport of rays over an opaque height field, from the source to the bins.
+"""Rays from the source to the bins over an opaque height field, one path after another.
 
-The path of a ray depends on the facets alone. It is followed first and kept as one record a
-bounce (local incidence and the turn of the frame); each material or wavelength then multiplies
-its own Fresnel matrices along the same record.
+The path depends on the facets alone; `pbrdf.kernels.shading` then multiplies the Fresnel
+matrices of each material or wavelength along its record.
 """
 
 import math
@@ -10,15 +9,10 @@ import math
 import numpy as np
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.binning import TWO_PI, bin_of_direction
+from pbrdf.kernels.binning import TWO_PI
 from pbrdf.kernels.frames import PARALLEL, turn_frame
-from pbrdf.kernels.fresnel import reflection_elements
 from pbrdf.kernels.heightfield import ESCAPED, HIT, SIDE, facet_gradient, walk
-
-# What became of the rays of a batch
-N_ESCAPED, N_TRUNCATED, N_LEAKED, N_SIDE, N_SEGMENTS = 0, 1, 2, 3, 4
-# Energies of unpolarised light
-ABSORBED, TRUNCATED, LEAKED = 0, 1, 2
+from pbrdf.kernels.shading import N_ESCAPED, N_LEAKED, N_SIDE, N_TRUNCATED, tally_path
 
 MAX_STEPS = 10_000_000
 # Smallest cosine of a hit: rounding may leave a grazing ray parallel to the facet it meets
@@ -29,8 +23,27 @@ STRIDE_PHI = 0.7548776662466927
 
 
 @jit(inline="always")
+def entry_point(ray, n_rays, launch, shifts):
+    """Place [cells] where a ray enters the top plane.
+
+    Points advance along x and fill y evenly, so that successive rays stay near each other.
+    """
+    x = launch[0] + launch[2] * ((ray + shifts[0]) / n_rays)
+    y = launch[1] + launch[3] * ((ray * STRIDE_Y + shifts[1]) % 1.0)
+    return x, y
+
+
+@jit(inline="always")
+def azimuth(ray, phi_i, uniform_phi, shifts):
+    """Azimuth of the source for a ray: fixed, or spread evenly over the circle."""
+    if uniform_phi:
+        return TWO_PI * ((ray * STRIDE_PHI + shifts[2]) % 1.0)
+    return phi_i
+
+
+@jit(inline="always")
 def reflect(k_x, k_y, k_z, slope_x, slope_y):
-    """Mirror direction at a facet; returns it, the facet normal and the cosine of incidence."""
+    """Mirror direction at a facet, the facet's normal and the cosine of incidence."""
     length = math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
     n_x = -slope_x / length
     n_y = -slope_y / length
@@ -44,76 +57,51 @@ def reflect(k_x, k_y, k_z, slope_x, slope_y):
     return r_x * scale, r_y * scale, r_z * scale, n_x, n_y, n_z, cos_beta
 
 
-@jit
-def reflect_once(cos_beta, turn, n, kappa, n_stokes, mueller):
-    """Mueller matrix R(out) F(beta) R(in) of a path with one bounce, paper eq. (16)."""
-    a, b, c, d = reflection_elements(cos_beta[0], n, kappa)
-    mueller[0, 0] = a
-    if n_stokes == 1:
-        return
-    c_in, s_in = turn[0, 0], turn[0, 1]
-    c_out, s_out = turn[1, 0], turn[1, 1]
-    mueller[0, 1] = b * c_in
-    mueller[0, 2] = b * s_in
-    mueller[1, 0] = c_out * b
-    mueller[1, 1] = c_out * a * c_in - s_out * c * s_in
-    mueller[1, 2] = c_out * a * s_in + s_out * c * c_in
-    mueller[2, 0] = -s_out * b
-    mueller[2, 1] = -s_out * a * c_in - c_out * c * s_in
-    mueller[2, 2] = -s_out * a * s_in + c_out * c * c_in
-    if n_stokes == 4:
-        mueller[0, 3] = 0.0
-        mueller[1, 3] = -s_out * d
-        mueller[2, 3] = -c_out * d
-        mueller[3, 0] = 0.0
-        mueller[3, 1] = -d * s_in
-        mueller[3, 2] = d * c_in
-        mueller[3, 3] = c
+@jit(inline="always")
+def bounce(k_x, k_y, k_z, s_x, s_y, s_z, slope_x, slope_y):
+    """Reflect a beam and its frame at a facet.
+
+    Returns the new direction, the new s axis, the speed at which the ray leaves the facet
+    upwards, the cosine of incidence and the turn of the frame into the plane of incidence.
+    """
+    r_x, r_y, r_z, n_x, n_y, n_z, cos_beta = reflect(k_x, k_y, k_z, slope_x, slope_y)
+    # The s axis of the facet is k x n, the same before and after
+    w_x = k_y * n_z - k_z * n_y
+    w_y = k_z * n_x - k_x * n_z
+    w_z = k_x * n_y - k_y * n_x
+    c2, s2 = turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, w_x, w_y, w_z)
+    square = w_x * w_x + w_y * w_y + w_z * w_z
+    if square > PARALLEL:
+        scale = 1.0 / math.sqrt(square)
+        s_x = w_x * scale
+        s_y = w_y * scale
+        s_z = w_z * scale
+    leave_rate = max(r_z - slope_x * r_x - slope_y * r_y, GRAZING)
+    return r_x, r_y, r_z, s_x, s_y, s_z, leave_rate, cos_beta, c2, s2
 
 
 @jit(inline="always")
-def turn_stokes(q, u, turn):
-    """Q and U after a turn of the frame whose double angle has cosine and sine `turn`."""
-    return turn[0] * q + turn[1] * u, turn[0] * u - turn[1] * q
-
-
-@jit
-def reflect_often(cos_beta, turn, n_bounces, n, kappa, n_stokes, mueller):
-    """Mueller matrix of a path with any number of bounces, one column a Stokes element in."""
-    for row in range(4):
-        for column in range(n_stokes):
-            mueller[row, column] = 1.0 if row == column else 0.0
-    for bounce in range(n_bounces):
-        a, b, c, d = reflection_elements(cos_beta[bounce], n, kappa)
-        for column in range(n_stokes):
-            i = mueller[0, column]
-            v = mueller[3, column]
-            # Into the frame of the facet
-            q, u = turn_stokes(mueller[1, column], mueller[2, column], turn[bounce])
-            # Fresnel reflection
-            mueller[0, column] = a * i + b * q
-            mueller[1, column] = b * i + a * q
-            mueller[2, column] = c * u - d * v
-            mueller[3, column] = d * u + c * v
-    # Into the meridian frame of the exit direction
-    for column in range(n_stokes):
-        q, u = turn_stokes(mueller[1, column], mueller[2, column], turn[n_bounces])
-        mueller[1, column] = q
-        mueller[2, column] = u
+def exit_turn(k_x, k_y, k_z, s_x, s_y, s_z, cos_phi_i, sin_phi_i):
+    """Turn of the frame to the meridian plane of the exit direction, e_s = z x k."""
+    m_x = -k_y
+    m_y = k_x
+    if k_x * k_x + k_y * k_y < PARALLEL:
+        # Straight up: the azimuth of the source stands for that of the detector
+        m_x = -sin_phi_i
+        m_y = cos_phi_i
+    return turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, m_x, m_y, 0.0)
 
 
 @jit
 def trace_path(
     heights, maxima, levels, z_top, periodic, pitch_x, pitch_y,
-    x, y, phi_i, sin_theta_i, cos_theta_i, max_bounces, cos_beta, turn,
+    x, y, cos_phi, sin_phi, sin_theta_i, cos_theta_i, max_bounces, cos_beta, turn,
 ):  # fmt: skip
     """Follow one ray that enters the top plane at (x, y) [cells] until it leaves for good.
 
-    Fills `cos_beta` (bounces) and `turn` (bounces + 1, 2). Returns
-    (fate, bounces, exit direction), with fate ESCAPED, HIT (truncated), SIDE or LOST.
+    Fills `cos_beta` (bounces) and `turn` (bounces + 1, 2). Returns the count to which the path
+    belongs, the number of bounces and the exit direction.
     """
-    cos_phi = math.cos(phi_i)
-    sin_phi = math.sin(phi_i)
     # The beam travels against dir_i; its frame has e_s horizontal
     k_x = -sin_theta_i * cos_phi
     k_y = -sin_theta_i * sin_phi
@@ -137,43 +125,26 @@ def trace_path(
         )  # fmt: skip
         if fate != HIT or bounces == max_bounces:
             break
-
-        # Reflect at the facet
         step_x, step_y = facet_gradient(heights, i, j, facet, periodic)
-        slope_x = step_x / pitch_x
-        slope_y = step_y / pitch_y
-        r_x, r_y, r_z, n_x, n_y, n_z, cosine = reflect(k_x, k_y, k_z, slope_x, slope_y)
-
-        # Turn the frame to the plane of incidence: its s axis is k x n, the same after it
-        w_x = k_y * n_z - k_z * n_y
-        w_y = k_z * n_x - k_x * n_z
-        w_z = k_x * n_y - k_y * n_x
-        c2, s2 = turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, w_x, w_y, w_z)
+        k_x, k_y, k_z, s_x, s_y, s_z, leave_rate, cosine, c2, s2 = bounce(
+            k_x, k_y, k_z, s_x, s_y, s_z, step_x / pitch_x, step_y / pitch_y
+        )
         cos_beta[bounces] = cosine
         turn[bounces, 0] = c2
         turn[bounces, 1] = s2
-        square = w_x * w_x + w_y * w_y + w_z * w_z
-        if square > PARALLEL:
-            scale = 1.0 / math.sqrt(square)
-            s_x = w_x * scale
-            s_y = w_y * scale
-            s_z = w_z * scale
-
-        k_x, k_y, k_z = r_x, r_y, r_z
-        leave_rate = max(k_z - slope_x * k_x - slope_y * k_y, GRAZING)
         bounces += 1
 
-    if fate == ESCAPED:
-        # Turn the frame to the meridian plane of the exit direction: e_s = z x k
-        m_x = -k_y
-        m_y = k_x
-        if k_x * k_x + k_y * k_y < PARALLEL:
-            m_x = -sin_phi
-            m_y = cos_phi
-        c2, s2 = turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, m_x, m_y, 0.0)
-        turn[bounces, 0] = c2
-        turn[bounces, 1] = s2
-    return fate, bounces, k_x, k_y, k_z
+    c2, s2 = exit_turn(k_x, k_y, k_z, s_x, s_y, s_z, cos_phi, sin_phi)
+    turn[bounces, 0] = c2
+    turn[bounces, 1] = s2
+    count = N_LEAKED
+    if fate == HIT:
+        count = N_TRUNCATED
+    elif fate == SIDE:
+        count = N_SIDE
+    elif fate == ESCAPED and bounces > 0:
+        count = N_ESCAPED
+    return count, bounces, k_x, k_y, k_z
 
 
 @jit
@@ -191,60 +162,22 @@ def trace_batch(
     energy          (wavelengths, 3), by what took it: ABSORBED, TRUNCATED, LEAKED, added to
     counts          rays by fate and number of path segments (5,), added to
     """
-    n_orders = brdf.shape[1]
-    n_theta = brdf.shape[2]
-    n_dphi = brdf.shape[3]
     cos_beta = np.empty(max_bounces)
     turn = np.empty((max_bounces + 1, 2))
     mueller = np.zeros((4, 4))
-    phi = phi_i
+    cos_phi = math.cos(phi_i)
+    sin_phi = math.sin(phi_i)
     for ray in range(n_rays):
-        # Entry points advance along x and fill y evenly, so that neighbours stay in cache
-        x = launch[0] + launch[2] * ((ray + shifts[0]) / n_rays)
-        y = launch[1] + launch[3] * ((ray * STRIDE_Y + shifts[1]) % 1.0)
+        x, y = entry_point(ray, n_rays, launch, shifts)
         if uniform_phi:
-            phi = TWO_PI * ((ray * STRIDE_PHI + shifts[2]) % 1.0)
-        fate, bounces, k_x, k_y, k_z = trace_path(
-            heights, maxima, levels, z_top, periodic, pitch_x, pitch_y,
-            x, y, phi, sin_theta_i, cos_theta_i, max_bounces, cos_beta, turn,
-        )  # fmt: skip
-        counts[N_SEGMENTS] += bounces + 1
-        if fate == SIDE:
-            counts[N_SIDE] += 1
-            continue
-
-        lost = -1
-        if fate == HIT:
-            lost = TRUNCATED
-            counts[N_TRUNCATED] += 1
-        elif fate != ESCAPED or bounces == 0:
-            lost = LEAKED
-            counts[N_LEAKED] += 1
-        else:
-            counts[N_ESCAPED] += 1
-        if lost >= 0:
-            # The last turn of the frame does not matter to the energy
-            turn[bounces, 0] = 1.0
-            turn[bounces, 1] = 0.0
-
-        order = min(bounces, n_orders) - 1
-        i_theta, i_dphi = 0, 0
-        if lost < 0:
+            phi = azimuth(ray, phi_i, uniform_phi, shifts)
             cos_phi = math.cos(phi)
             sin_phi = math.sin(phi)
-            i_theta, i_dphi = bin_of_direction(
-                k_x, k_y, k_z, cos_phi, sin_phi, n_theta, n_dphi
-            )
-        for w in range(n.shape[0]):
-            if bounces == 1:
-                reflect_once(cos_beta, turn, n[w], kappa[w], n_stokes, mueller)
-            else:
-                reflect_often(cos_beta, turn, bounces, n[w], kappa[w], n_stokes, mueller)
-            energy[w, ABSORBED] += 1.0 - mueller[0, 0]
-            if lost >= 0:
-                energy[w, lost] += mueller[0, 0]
-                continue
-            place = brdf[w, order, i_theta, i_dphi]
-            for row in range(n_stokes):
-                for column in range(n_stokes):
-                    place[row, column] += mueller[row, column]
+        count, bounces, k_x, k_y, k_z = trace_path(
+            heights, maxima, levels, z_top, periodic, pitch_x, pitch_y,
+            x, y, cos_phi, sin_phi, sin_theta_i, cos_theta_i, max_bounces, cos_beta, turn,
+        )  # fmt: skip
+        tally_path(
+            count, cos_beta, turn, bounces, k_x, k_y, k_z, cos_phi, sin_phi,
+            n, kappa, n_stokes, mueller, brdf, energy, counts,
+        )  # fmt: skip

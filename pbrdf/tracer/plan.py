@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrdf.conventions import BOUNCES, detector_bins
-from pbrdf.kernels import transport
+from pbrdf.kernels import shading, transport
 from pbrdf.kernels.moments import add_sample
 from pbrdf.tracer.field import Field
 
@@ -108,7 +108,7 @@ class Moments:
         self.counts += tally.counts
         angles, wavelengths, orders = tally.flux.shape[:3]
         # Rays that left a finite map sideways count in neither part of the fraction
-        counted = self.plan.n_rays - tally.counts[:, transport.N_SIDE]
+        counted = self.plan.n_rays - tally.counts[:, shading.N_SIDE]
         scale = 1.0 / np.maximum(counted, 1)
         for a in range(angles):
             add_sample(

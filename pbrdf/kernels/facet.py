@@ -1,0 +1,129 @@
+"""The facet that mirrors one direction into another: tilt, incidence and frame rotations.
+
+Equations (12) to (16) of the paper with (13) as the double angle it must be, (16) taken at
+the local incidence beta, and the rotations from dot products of frame vectors instead of
+the arccos of (14), (15), which loses their sign and all digits near zero.
+
+Everything is written in the half difference d of the zeniths and half the azimuth h:
+
+    sin^2 beta = sin^2 d + sin(theta_i) sin(theta_s) sin^2 h
+
+is a sum of positive terms, so retro-reflection costs no digits; neither do normal
+incidence and grazing, where sines and cosines enter as themselves.
+"""
+
+from collections import namedtuple
+from math import cos, sin, sqrt
+
+from . import jit
+from .fresnel import select
+
+__all__ = ["Directions", "Facet", "directions", "mirror_facet", "rotated_elements"]
+
+# Squared sine of 2 beta below which the plane of incidence is undefined
+DEGENERATE = 1e-290
+
+Directions = namedtuple(  # noqa: PYI024  (numba compiles namedtuples, not typed classes)
+    "Directions", "cos_i sin_i cos_s sin_s sin_d cos_d sin_h cos_h cos_phi sin_phi"
+)
+Facet = namedtuple("Facet", "slope_x slope_y tan2_tilt cos_beta sin2_beta")  # noqa: PYI024
+
+
+@jit
+def directions(theta_i, theta_s, dphi, phi_i):
+    """Sines and cosines of the zeniths, d = (theta_i - theta_s)/2, h = dphi/2 and phi_i."""
+    sin_d = sin(0.5 * (theta_i - theta_s))
+    return Directions(
+        cos(theta_i),
+        sin(theta_i),
+        cos(theta_s),
+        sin(theta_s),
+        sin_d,
+        sqrt(1.0 - sin_d * sin_d),
+        sin(0.5 * dphi),
+        cos(0.5 * dphi),
+        cos(phi_i),
+        sin(phi_i),
+    )
+
+
+@jit
+def mirror_facet(way):
+    """Slopes, squared tangent of the tilt and local incidence of the mirroring facet.
+
+    The half vector over its z component gives the slopes along and across the plane of
+    incidence; the first is tan d + 2 sin(theta_s) cos^2 h / (cos(theta_i) + cos(theta_s)).
+    """
+    sum_cos = way.cos_i + way.cos_s
+    across = 2.0 * way.sin_s * way.cos_h / sum_cos
+    along = way.sin_d / way.cos_d + across * way.cos_h
+    across = across * way.sin_h
+    tan2_tilt = along * along + across * across
+
+    # The half vector is twice cos(beta) long: equation (12)
+    cos_beta = 0.5 * sum_cos * sqrt(1.0 + tan2_tilt)
+    sin2_beta = way.sin_d * way.sin_d + way.sin_i * way.sin_s * way.sin_h * way.sin_h
+
+    # A normal leans downhill: the surface gradient is minus the normal's lean
+    slope_x = across * way.sin_phi - along * way.cos_phi
+    slope_y = -along * way.sin_phi - across * way.cos_phi
+    return Facet(slope_x, slope_y, tan2_tilt, cos_beta, sin2_beta)
+
+
+@jit
+def double_angle(cosine, sine, cos_limit, sin_limit):
+    """cos 2a and sin 2a of the direction (cosine, sine), of any length; a limit if none."""
+    norm = cosine * cosine + sine * sine
+    defined = norm > DEGENERATE
+    safe = select(defined, norm, 1.0)
+    cos_2a = (cosine - sine) * (cosine + sine) / safe
+    sin_2a = 2.0 * cosine * sine / safe
+    return select(defined, cos_2a, cos_limit), select(defined, sin_2a, sin_limit)
+
+
+@jit
+def frame_rotations(way):
+    """cos 2a, sin 2a from the incident frame to the facet's, then from the scattered frame.
+
+    Times sin(2 beta), the facet's e_s has the components (x, y) along the beam's e_s and
+    e_p: x_i = sin(theta_i - theta_s) + 2 cos(theta_i) sin(theta_s) sin^2 h,
+    y_i = sin(theta_s) sin(dphi), and the same with i and s exchanged.
+    """
+    sin_diff = 2.0 * way.sin_d * way.cos_d
+    versine = 2.0 * way.sin_h * way.sin_h
+    sin_dphi = 2.0 * way.sin_h * way.cos_h
+    cos_dphi = 1.0 - versine
+
+    # In exact retro-reflection only the sum of both angles matters: pi - dphi
+    cos_2i, sin_2i = double_angle(
+        sin_diff + way.cos_i * way.sin_s * versine, way.sin_s * sin_dphi, 1.0, 0.0
+    )
+    cos_2s, sin_2s = double_angle(
+        way.sin_i * way.cos_s * versine - sin_diff,
+        way.sin_i * sin_dphi,
+        2.0 * cos_dphi * cos_dphi - 1.0,
+        -2.0 * sin_dphi * cos_dphi,
+    )
+    return cos_2i, sin_2i, cos_2s, sin_2s
+
+
+@jit
+def rotated_elements(way, a, b, c, d):
+    """Sixteen elements, row by row, of F' = R(-alpha_s) F(beta) R(alpha_i), equation (16)."""
+    cos_2i, sin_2i, cos_2s, sin_2s = frame_rotations(way)
+    return (
+        (a, b * cos_2i, b * sin_2i, 0.0),
+        (
+            b * cos_2s,
+            a * cos_2s * cos_2i + c * sin_2s * sin_2i,
+            a * cos_2s * sin_2i - c * sin_2s * cos_2i,
+            d * sin_2s,
+        ),
+        (
+            b * sin_2s,
+            a * sin_2s * cos_2i - c * cos_2s * sin_2i,
+            a * sin_2s * sin_2i + c * cos_2s * cos_2i,
+            -d * cos_2s,
+        ),
+        (0.0, -d * sin_2i, d * cos_2i, c),
+    )
