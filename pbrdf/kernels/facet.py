@@ -23,10 +23,11 @@ __all__ = ["Directions", "Facet", "directions", "mirror_facet", "rotated_element
 # Squared sine of 2 beta below which the plane of incidence is undefined
 DEGENERATE = 1e-290
 
-Directions = namedtuple(  # noqa: PYI024  (numba compiles namedtuples, not typed classes)
+# Named tuples are what Numba compiles; typed classes are not
+Directions = namedtuple(
     "Directions", "cos_i sin_i cos_s sin_s sin_d cos_d sin_h cos_h cos_phi sin_phi"
 )
-Facet = namedtuple("Facet", "slope_x slope_y tan2_tilt cos_beta sin2_beta")  # noqa: PYI024
+Facet = namedtuple("Facet", "slope_x slope_y tan2_tilt cos_beta sin2_beta")
 
 
 @jit
@@ -72,7 +73,7 @@ def mirror_facet(way):
 
 @jit
 def double_angle(cosine, sine, cos_limit, sin_limit):
-    """cos 2a and sin 2a of the direction (cosine, sine), of any length; a limit if none."""
+    """Double angle of the direction (cosine, sine) of any length; a limit if it is zero."""
     norm = cosine * cosine + sine * sine
     defined = norm > DEGENERATE
     safe = select(defined, norm, 1.0)
@@ -83,7 +84,7 @@ def double_angle(cosine, sine, cos_limit, sin_limit):
 
 @jit
 def frame_rotations(way):
-    """cos 2a, sin 2a from the incident frame to the facet's, then from the scattered frame.
+    """Double angles, as cos and sin, from the incident frame and from the scattered frame.
 
     Times sin(2 beta), the facet's e_s has the components (x, y) along the beam's e_s and
     e_p: x_i = sin(theta_i - theta_s) + 2 cos(theta_i) sin(theta_s) sin^2 h,
@@ -109,7 +110,7 @@ def frame_rotations(way):
 
 @jit
 def rotated_elements(way, a, b, c, d):
-    """Sixteen elements, row by row, of F' = R(-alpha_s) F(beta) R(alpha_i), equation (16)."""
+    """Rows of F' = R(-alpha_s) F(beta) R(alpha_i), equation (16)."""
     cos_2i, sin_2i, cos_2s, sin_2s = frame_rotations(way)
     return (
         (a, b * cos_2i, b * sin_2i, 0.0),

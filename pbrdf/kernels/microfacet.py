@@ -12,7 +12,7 @@ from .slopes import slope_density
 __all__ = ["Surface", "fill_brdf", "microfacet_brdf", "specular_elements"]
 
 # rough, shadow: the namedtuples of their modules; gain, diffuse: factors of the terms
-Surface = namedtuple("Surface", "rough shadow specular_gain diffuse_albedo")  # noqa: PYI024
+Surface = namedtuple("Surface", "rough shadow specular_gain diffuse_albedo")
 
 
 @jit
@@ -47,7 +47,7 @@ def microfacet_brdf(way, n, kappa, surface):
 
 @jit
 def fill_brdf(theta_i, theta_s, dphi, phi_i, n, kappa, surface, out):
-    """Fill out[k] with the matrix of geometry k; arrays of length 1 hold for all of them."""
+    """Fill out[k] with the matrix of geometry k; arrays of length 1 hold for all."""
     each_phi = 1 if phi_i.size > 1 else 0
     each_index = 1 if n.size > 1 else 0
     for k in range(theta_i.size):

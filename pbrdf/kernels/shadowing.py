@@ -30,12 +30,12 @@ __all__ = [
 ) = range(7)
 
 # rule: one of the above; omega, tau: constants of Maxwell and Beard in radians
-Shadowing = namedtuple("Shadowing", "rule omega tau")  # noqa: PYI024
+Shadowing = namedtuple("Shadowing", "rule omega tau")
 
 
 @jit
 def maxwell_beard(facet, omega, tau):
-    """Empirical factor, equation (21): (1 + tilt/Omega exp(-2 beta/tau))/(1 + tilt/Omega)."""
+    """Empirical equation (21): (1 + tilt/Omega exp(-2 beta/tau))/(1 + tilt/Omega)."""
     tilt = atan2(sqrt(facet.tan2_tilt + TINY), 1.0)
     beta = atan2(sqrt(facet.sin2_beta + TINY), facet.cos_beta)
     ratio = tilt / omega

@@ -1,8 +1,8 @@
 """Densities of facet slopes, and the mean slope that a ray meets.
 
-Every law is a function f(r^2) of the squared slope r^2, stretched along the two axes where
-it is anisotropic: r^2 = (sy/sx) zx^2 + (sx/sy) zy^2, which conserves area. The facet density
-of equation (17) is f / cos^4(tilt).
+Every law is a function f(r^2) of the squared slope r^2, stretched along the two axes
+where it is anisotropic: r^2 = (sy/sx) zx^2 + (sx/sy) zy^2, which conserves area. The facet
+density of equation (17) is f / cos^4(tilt).
 """
 
 from collections import namedtuple
@@ -29,7 +29,7 @@ __all__ = [
 GAUSSIAN, MODIFIED_GAUSSIAN, MODIFIED_CAUCHY, EXPONENTIAL, TROWBRIDGE_REITZ = range(5)
 
 # law: one of the above; slope_x, slope_y: per-axis scale; norm: from `slope_norm`
-Roughness = namedtuple("Roughness", "law slope_x slope_y norm")  # noqa: PYI024
+Roughness = namedtuple("Roughness", "law slope_x slope_y norm")
 
 SQRT_3 = sqrt(3.0)
 SQRT_PI = sqrt(pi)

@@ -1,0 +1,174 @@
+"""The analytical model: Fresnel facets, slope distribution, shadowing, diffuse terms."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pbrdf.analytic.geometry import flat_geometry
+from pbrdf.analytic.tables import SHADOWING, SLOPE_DISTRIBUTIONS, code_of
+from pbrdf.errors import require
+from pbrdf.kernels import microfacet as kernel
+from pbrdf.kernels.shadowing import Shadowing
+from pbrdf.kernels.slopes import Roughness, slope_norm
+from pbrdf.optics.materials import Material
+
+__all__ = ["MicrofacetModel"]
+
+# Below this many matrices a thread costs more than it saves
+CHUNK = 16384
+
+
+@dataclass(frozen=True)
+class MicrofacetModel:
+    """Polarised BRDF of a rough surface as a distribution of mirroring facets.
+
+    Parameters
+    ----------
+    material : Material
+        Index of the facets.
+    slope_rms : float or (float, float)
+        Rms slope PER AXIS, along x and y where they differ. [1]
+    slope_distribution : str
+        A key of `pbrdf.analytic.SLOPE_DISTRIBUTIONS`.
+    shadowing : str
+        A key of `pbrdf.analytic.SHADOWING`.
+    specular_gain : float
+        Factor of the specular term; 1 by physics. [1]
+    diffuse_albedo : float
+        The paper's additive Lambertian term: brdf[0, 0] += diffuse_albedo/pi. It is not
+        `Material.diffuse_albedo`, the base under the interface. [1]
+    shadow_omega, shadow_tau : float
+        Constants of the Maxwell-Beard factor. [rad]
+
+    Raises
+    ------
+    ValueError
+        If a value leaves its range or a name is unknown.
+
+    References
+    ----------
+    .. [1] M. Gartley, S. Brown, J. Schott, Micro-scale surface and contaminate modeling for
+       polarimetric signature prediction, section 2. Equations (1), (2), (5), (6), (10),
+       (13) and (17) are used in their corrected form.
+
+    Examples
+    --------
+    Specular reflection of a rough glass is polarised perpendicular to its plane:
+
+    >>> import numpy as np
+    >>> model = MicrofacetModel(Material(1.5), slope_rms=0.2)
+    >>> model.brdf(0.7, 0.7, np.pi)[:2, :2].round(4)
+    array([[0.0779, 0.0538],
+           [0.0538, 0.0779]])
+    """
+
+    material: Material
+    slope_rms: float | tuple[float, float]
+    slope_distribution: str = "gaussian"
+    shadowing: str = "smith-correlated"
+    specular_gain: float = 1.0
+    diffuse_albedo: float = 0.0
+    shadow_omega: float = 0.7
+    shadow_tau: float = 0.25
+
+    def __post_init__(self) -> None:
+        slopes = require(
+            "slope_rms", self.slope_rms, lambda v: (v > 0) & (v < 1e3), "be > 0 [1]",
+            "A smooth surface has no BRDF; the slope is a tangent, not an angle.",
+        )  # fmt: skip
+        if slopes.shape not in ((), (2,)):
+            msg = f"slope_rms must be one number or (x, y), got shape {slopes.shape}."
+            raise ValueError(msg)
+        pair = slopes.tolist()
+        object.__setattr__(self, "slope_rms", tuple(pair) if slopes.ndim else pair)
+        code_of(SLOPE_DISTRIBUTIONS, self.slope_distribution, "slope_distribution")
+        code_of(SHADOWING, self.shadowing, "shadowing")
+        for name in ("specular_gain", "diffuse_albedo"):
+            require(name, getattr(self, name), lambda v: v >= 0, "be >= 0 [1]", "")
+        for name in ("shadow_omega", "shadow_tau"):
+            require(name, getattr(self, name), lambda v: v > 0, "be > 0 [rad]", "")
+
+    def with_parameters(self, **changes: Any) -> "MicrofacetModel":
+        """Copy with some parameters changed.
+
+        Examples
+        --------
+        >>> MicrofacetModel(Material(1.5), 0.2).with_parameters(specular_gain=0.5).slope_rms
+        0.2
+        """
+        return replace(self, **changes)
+
+    def brdf(
+        self,
+        theta_i: npt.ArrayLike,
+        theta_s: npt.ArrayLike,
+        dphi: npt.ArrayLike,
+        wavelength: npt.ArrayLike | None = None,
+        *,
+        phi_i: npt.ArrayLike = 0.0,
+    ) -> np.ndarray:
+        """Mueller BRDF in the frames of the conventions page; arguments broadcast.
+
+        Parameters
+        ----------
+        theta_i, theta_s : array_like
+            Zeniths of the directions to source and detector, in [0, pi/2]. [rad]
+        dphi : array_like
+            phi_s - phi_i; specular at pi. [rad]
+        wavelength : array_like, optional
+            Vacuum wavelength, needed by tabulated materials. [um]
+        phi_i : array_like
+            Azimuth of the source from the x axis of an anisotropic surface. [rad]
+
+        Returns
+        -------
+        ndarray, shape (..., 4, 4)
+            f_r = dL/dE, not multiplied by cos(theta_s). [1/sr]
+
+        Raises
+        ------
+        ValueError
+            If an angle leaves its range (degrees?), or the wavelength the material's.
+        """
+        n, kappa = self.material.indices(wavelength)
+        shape, columns = flat_geometry(theta_i, theta_s, dphi, phi_i, n, kappa)
+        size = columns[0].size
+        # The kernel reads n and kappa with one stride
+        if columns[4].size != columns[5].size:
+            columns[4:] = [np.broadcast_to(c, size).copy() for c in columns[4:]]
+        out = np.empty((size, 4, 4))
+        _fill(columns, self._surface(), out)
+        return out.reshape(*shape, 4, 4)
+
+    def _surface(self) -> kernel.Surface:
+        """Numbers of the model as the kernels take them."""
+        law = SLOPE_DISTRIBUTIONS[self.slope_distribution].code
+        pair = self.slope_rms
+        slope_x, slope_y = pair if isinstance(pair, tuple) else (pair, pair)
+        return kernel.Surface(
+            Roughness(law, slope_x, slope_y, slope_norm(law, slope_x, slope_y)),
+            Shadowing(SHADOWING[self.shadowing].code, self.shadow_omega, self.shadow_tau),
+            float(self.specular_gain),
+            float(self.diffuse_albedo),
+        )
+
+
+def _fill(columns: list[np.ndarray], surface: kernel.Surface, out: np.ndarray) -> None:
+    """Run the kernel over chunks, on as many threads as pay."""
+    size = len(out)
+    if size <= CHUNK:
+        kernel.fill_brdf(*columns, surface, out)
+        return
+
+    def fill_part(start: int) -> None:
+        part = slice(start, start + CHUNK)
+        pieces = [c[part] if c.size > 1 else c for c in columns]
+        kernel.fill_brdf(*pieces, surface, out[part])
+
+    workers = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(fill_part, range(0, size, CHUNK)))
