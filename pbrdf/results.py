@@ -13,6 +13,7 @@ from pbrdf.kernels.shading import (
     N_ESCAPED,
     N_LEAKED,
     N_SEGMENTS,
+    N_SELF,
     N_SIDE,
     N_TRUNCATED,
     TRUNCATED,
@@ -87,6 +88,7 @@ def to_dataset(
         "rays_truncated": counts[:, N_TRUNCATED].tolist(),
         "rays_leaked": counts[:, N_LEAKED].tolist(),
         "rays_left_sideways": counts[:, N_SIDE].tolist(),
+        "self_hits": int(counts[:, N_SELF].sum()),
         "rel_error": moments.rel_error(),
     }
     return dataset

@@ -15,8 +15,10 @@ from pbrdf.errors import AccuracyWarning, require
 from pbrdf.results import to_dataset
 from pbrdf.scene import Scene
 from pbrdf.surface import GaussianSurface, HeightMap
+from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
-from pbrdf.tracer.plan import Moments, Plan, Tally, trace_sample
+from pbrdf.tracer.plan import Moments, Plan, Tally
+from pbrdf.tracer.trace import trace_sample
 from pbrdf.validity import geometric_optics_warnings
 
 STOKES_COUNT = {"full": 4, "linear": 3, "unpolarized": 1}
@@ -44,6 +46,7 @@ def simulate(
     stokes: str = "full",
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
+    skips: bool = True,
 ) -> xr.Dataset:
     """Trace light from the source to the hemisphere and bin it as Mueller BRDF.
 
@@ -77,6 +80,9 @@ def simulate(
         Threads; all cores by default. Does not change the result.
     progress : callable, optional
         Called with (samples done, samples in all).
+    skips : bool
+        Follow rays over a height field by an exact float64 walk, without Embree; False sends
+        every ray through Embree. Both trace the same rays.
 
     Returns
     -------
@@ -137,10 +143,10 @@ def simulate(
     if batched:
         # The surface, or the one realisation asked for, stays the same in all batches
         shared = surface if isinstance(surface, HeightMap) else surface.sample(root.spawn(1)[0])
-        draw = partial(_trace_fixed, Field.of(shared), plan)
+        draw = partial(_trace_fixed, _prepare(shared, skips), plan)
     else:
         assert isinstance(surface, GaussianSurface)  # noqa: S101
-        draw = partial(_trace_realization, surface, plan)
+        draw = partial(_trace_realization, surface, plan, skips)
 
     moments = Moments(plan)
     limit = samples if target is None else max(samples, MAX_SAMPLES)
@@ -166,20 +172,28 @@ def simulate(
             "stokes": stokes,
             "phi_i": "uniform" if plan.phi_i is None else plan.phi_i,
             "target_rel_error": np.nan if target is None else target,
+            "intersector": "height-field walk" if skips else "embree",
             "warnings": notes,
         },
     )
 
 
-def _trace_fixed(field: Field, plan: Plan, seed: np.random.SeedSequence) -> Tally:
-    return trace_sample(field, plan, seed)
+def _prepare(surface: HeightMap, skips: bool) -> Field | EmbreeField:
+    field = Field.of(surface)
+    return field if skips else EmbreeField.of(field)
+
+
+def _trace_fixed(
+    target: Field | EmbreeField, plan: Plan, seed: np.random.SeedSequence
+) -> Tally:
+    return trace_sample(target, plan, seed)
 
 
 def _trace_realization(
-    surface: GaussianSurface, plan: Plan, seed: np.random.SeedSequence
+    surface: GaussianSurface, plan: Plan, skips: bool, seed: np.random.SeedSequence
 ) -> Tally:
     heights, rays = seed.spawn(2)
-    return trace_sample(Field.of(surface.sample(heights)), plan, rays)
+    return trace_sample(_prepare(surface.sample(heights), skips), plan, rays)
 
 
 def _in_order(

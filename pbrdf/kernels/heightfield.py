@@ -211,7 +211,8 @@ def walk(
                 i = min(max(int(x0 + speed_x * t_out), low_x), high_x - 1)
         if i < 0 or i >= nx or j < 0 or j >= ny:
             if not periodic:
-                return SIDE, i, j, -1, u, v, z + speed_z * t_out
+                fate = ESCAPED if rising and z_out >= z_top else SIDE
+                return fate, i, j, -1, u, v, z_out
             if i < 0:
                 i += nx
                 x0 += nx

@@ -8,8 +8,9 @@ from pbrdf.kernels import jit
 from pbrdf.kernels.binning import bin_of_direction
 from pbrdf.kernels.fresnel import reflection_elements
 
-# What became of the rays of a sample, and how many path segments they took
-N_ESCAPED, N_TRUNCATED, N_LEAKED, N_SIDE, N_SEGMENTS = 0, 1, 2, 3, 4
+# What became of the rays of a sample, the path segments they took, and the hits of a facet
+# just left (impossible but for rounding inside the intersector)
+N_ESCAPED, N_TRUNCATED, N_LEAKED, N_SIDE, N_SEGMENTS, N_SELF, N_COUNTS = 0, 1, 2, 3, 4, 5, 6
 # Energies of unpolarised light
 ABSORBED, TRUNCATED, LEAKED = 0, 1, 2
 

@@ -160,7 +160,7 @@ def trace_batch(
     n, kappa        refractive index (wavelengths,)
     brdf            flux by bin (wavelengths, bounces, n_theta, n_dphi, stokes, stokes), added to
     energy          (wavelengths, 3), by what took it: ABSORBED, TRUNCATED, LEAKED, added to
-    counts          rays by fate and number of path segments (5,), added to
+    counts          rays by fate, path segments and self hits (6,), added to
     """
     cos_beta = np.empty(max_bounces)
     turn = np.empty((max_bounces + 1, 2))

@@ -55,6 +55,12 @@ class Field:
             periodic=surface.periodic,
         )
 
+    @property
+    def cells(self) -> tuple[int, int]:
+        """Number of grid cells along x and y."""
+        nx, ny = self.heights.shape
+        return (nx, ny) if self.periodic else (nx - 1, ny - 1)
+
     def entry_rectangle(self, theta_i: float, phi_i: float | None) -> np.ndarray:
         """Corner x, y and lengths [cells] of the entry points in the top plane, shape (4,).
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrdf.conventions import BOUNCES, detector_bins
-from pbrdf.kernels import shading, transport
+from pbrdf.kernels import shading
 from pbrdf.kernels.moments import add_sample
-from pbrdf.tracer.field import Field
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +53,8 @@ class Tally:
     """Flux, energy and counts of one sample, per incident direction.
 
     `flux` has the shape of the plan and is not normalised; `energy` (angles, wavelengths, 3)
-    is what was absorbed, truncated and leaked; `counts` (angles, 5) as in the transport kernel.
+    is what was absorbed, truncated and leaked; `counts` (angles, 6) as in
+    `pbrdf.kernels.shading`.
     """
 
     flux: np.ndarray
@@ -62,29 +62,15 @@ class Tally:
     counts: np.ndarray
 
 
-def trace_sample(field: Field, plan: Plan, seed: np.random.SeedSequence) -> Tally:
-    """Trace every incident direction of the plan over one surface.
-
-    Releases the interpreter lock; the streams belong to the sample, so the result does not
-    depend on how samples are spread over threads.
-    """
-    tally = Tally(
-        flux=np.zeros(plan.tally_shape),
-        energy=np.zeros((len(plan.theta_i), len(plan.n), 3)),
-        counts=np.zeros((len(plan.theta_i), 5), dtype=np.int64),
-    )
-    shifts = np.random.default_rng(seed).random((len(plan.theta_i), 3))
-    for index, theta in enumerate(plan.theta_i):
-        transport.trace_batch(
-            field.heights, field.maxima, field.levels, field.z_top, field.periodic,
-            field.pitch[0], field.pitch[1],
-            field.entry_rectangle(theta, plan.phi_i),
-            np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
-            plan.n_rays, shifts[index], plan.max_bounces,
-            plan.n, plan.kappa, plan.n_stokes,
-            tally.flux[index], tally.energy[index], tally.counts[index],
-        )  # fmt: skip
-    return tally
+    @classmethod
+    def empty(cls, plan: Plan) -> "Tally":
+        """Nothing traced yet."""
+        angles, wavelengths = plan.tally_shape[:2]
+        return cls(
+            flux=np.zeros(plan.tally_shape),
+            energy=np.zeros((angles, wavelengths, 3)),
+            counts=np.zeros((angles, shading.N_COUNTS), dtype=np.int64),
+        )
 
 
 class Moments:
@@ -94,7 +80,7 @@ class Moments:
         shape = plan.tally_shape
         self.plan = plan
         self.samples = 0
-        self.counts = np.zeros((shape[0], 5), dtype=np.int64)
+        self.counts = np.zeros((shape[0], shading.N_COUNTS), dtype=np.int64)
         self._mean = np.zeros(shape)
         self._scatter = np.zeros(shape)
         self._mean_total = np.zeros(shape[:2] + shape[3:])

@@ -1,0 +1,214 @@
+"""Rays from the source to the bins in batches, for an intersector that answers for batches.
+
+The same physics as `pbrdf.kernels.transport`, with the walk replaced by calls of Embree. A ray
+keeps its exact place (cell, facet, u, v, height) in float64; only the copy handed to Embree is
+float32 and lifted off its facet along the normal. A hit facet returns as a number; where on its
+plane the ray arrives follows in float64.
+"""
+
+import math
+
+from pbrdf.kernels import jit
+from pbrdf.kernels.heightfield import facet_gradient
+from pbrdf.kernels.shading import N_ESCAPED, N_LEAKED, N_SELF, N_SIDE, N_TRUNCATED, tally_path
+from pbrdf.kernels.transport import azimuth, bounce, entry_point, exit_turn
+
+# Columns of a ray's state: place in cell, height, direction, s axis, azimuth of the source
+U, V, Z, KX, KY, KZ, SX, SY, SZ, COS_PHI, SIN_PHI, N_STATE = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
+# Columns of a ray's cell: i, j, facet (-1 in free space), face it left, bounces
+CELL_I, CELL_J, FACET, FACE, BOUNCES, N_CELL = 0, 1, 2, 3, 4, 5
+
+
+@jit
+def enter_rays(
+    first, n_rays, launch, shifts, sin_theta_i, cos_theta_i, phi_i, uniform_phi, z_top, nx, ny,
+    state, cell, active,
+):  # fmt: skip
+    """Put rays `first`, first + 1 ... of a batch at their entry points in the top plane."""
+    for k in range(active.shape[0]):
+        ray = first + k
+        x, y = entry_point(ray, n_rays, launch, shifts)
+        phi = azimuth(ray, phi_i, uniform_phi, shifts)
+        i = min(int(x), nx - 1)
+        j = min(int(y), ny - 1)
+        place = state[k]
+        place[U] = x - i
+        place[V] = y - j
+        place[Z] = z_top
+        place[COS_PHI] = math.cos(phi)
+        place[SIN_PHI] = math.sin(phi)
+        place[KX] = -sin_theta_i * place[COS_PHI]
+        place[KY] = -sin_theta_i * place[SIN_PHI]
+        place[KZ] = -cos_theta_i
+        place[SX] = place[SIN_PHI]
+        place[SY] = -place[COS_PHI]
+        place[SZ] = 0.0
+        cell[k, CELL_I] = i
+        cell[k, CELL_J] = j
+        cell[k, FACET] = -1
+        cell[k, FACE] = -1
+        cell[k, BOUNCES] = 0
+        active[k] = k
+
+
+@jit
+def emit_rays(
+    heights, periodic, pitch_x, pitch_y, center_x, center_y, center_z, unit, offset,
+    state, cell, active, origins, directions,
+):  # fmt: skip
+    """Write the active rays as Embree takes them: centred, in units of a cell, float32."""
+    for a in range(active.shape[0]):
+        k = active[a]
+        place = state[k]
+        i = cell[k, CELL_I]
+        j = cell[k, CELL_J]
+        x = (i + place[U] - center_x) * pitch_x / unit
+        y = (j + place[V] - center_y) * pitch_y / unit
+        z = (place[Z] - center_z) / unit
+        facet = cell[k, FACET]
+        if facet >= 0:
+            # Lift the ray off its facet along the normal
+            step_x, step_y = facet_gradient(heights, i, j, facet, periodic)
+            slope_x = step_x / pitch_x
+            slope_y = step_y / pitch_y
+            lift = offset / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
+            x -= slope_x * lift
+            y -= slope_y * lift
+            z += lift
+        origins[a, 0] = x
+        origins[a, 1] = y
+        origins[a, 2] = z
+        directions[a, 0] = place[KX]
+        directions[a, 1] = place[KY]
+        directions[a, 2] = place[KZ]
+
+
+@jit
+def arrive_on_facet(heights, periodic, pitch_x, pitch_y, i, j, facet, place, column, row):
+    """Place (u, v, z) where a ray from cell (i, j) meets a facet of the cell (column, row).
+
+    The cell is given without wrapping, so that it lies where the ray arrives.
+    """
+    nx, ny = heights.shape
+    ci = column % nx if periodic else column
+    cj = row % ny if periodic else row
+    step_x, step_y = facet_gradient(heights, ci, cj, facet, periodic)
+    speed_x = place[KX] / pitch_x
+    speed_y = place[KY] / pitch_y
+    # Clearance above the facet's plane, and how fast it shrinks
+    u = i + place[U] - column
+    v = j + place[V] - row
+    clear = place[Z] - (heights[ci, cj] + step_x * u + step_y * v)
+    rate = place[KZ] - step_x * speed_x - step_y * speed_y
+    t = 0.0
+    if rate < 0.0:
+        t = max(-clear / rate, 0.0)
+    # Rounding may put the place a hair outside its cell
+    u = min(max(u + speed_x * t, 0.0), 1.0)
+    v = min(max(v + speed_y * t, 0.0), 1.0)
+    return ci, cj, u, v, heights[ci, cj] + step_x * u + step_y * v
+
+
+@jit
+def leave_domain(pitch_x, pitch_y, i, j, place, low_x, low_y, high_x, high_y):
+    """Time at which a ray that hits nothing leaves the rectangle of the mesh."""
+    t = math.inf
+    x = i + place[U]
+    y = j + place[V]
+    if place[KX] != 0.0:
+        t = min(t, ((high_x if place[KX] > 0.0 else low_x) - x) * pitch_x / place[KX])
+    if place[KY] != 0.0:
+        t = min(t, ((high_y if place[KY] > 0.0 else low_y) - y) * pitch_y / place[KY])
+    return max(t, 0.0)
+
+
+@jit
+def advance_rays(
+    heights, periodic, pitch_x, pitch_y, z_top, z_bottom, guard_x, guard_y, faces, max_bounces,
+    state, cell, active, cos_beta, turn,
+    n, kappa, n_stokes, mueller, brdf, energy, counts,
+):  # fmt: skip
+    """Take the active rays through the answers of Embree, and tally those whose path ends.
+
+    faces       face hit by each active ray, -1 for none
+    cos_beta, turn  records of the rays (chunk, bounces), (chunk, bounces + 1, 2)
+
+    Keeps the rays that travel on at the front of `active`, in their order, and returns their
+    number.
+    """
+    nx = heights.shape[0] if periodic else heights.shape[0] - 1
+    ny = heights.shape[1] if periodic else heights.shape[1] - 1
+    mesh_ny = ny + 2 * guard_y
+    kept = 0
+    for a in range(active.shape[0]):
+        k = active[a]
+        place = state[k]
+        bounces = cell[k, BOUNCES]
+        end = -1
+        face = faces[a]
+        if face >= 0 and face == cell[k, FACE]:
+            counts[N_SELF] += 1
+            end = N_LEAKED
+        elif face >= 0 and bounces == max_bounces:
+            end = N_TRUNCATED
+        elif face >= 0:
+            column = (face // 2) // mesh_ny - guard_x
+            row = (face // 2) % mesh_ny - guard_y
+            facet = face % 2
+            i, j, u, v, z = arrive_on_facet(
+                heights, periodic, pitch_x, pitch_y,
+                cell[k, CELL_I], cell[k, CELL_J], facet, place, column, row,
+            )  # fmt: skip
+            place[U] = u
+            place[V] = v
+            place[Z] = z
+            cell[k, CELL_I] = i
+            cell[k, CELL_J] = j
+            cell[k, FACET] = facet
+            cell[k, FACE] = 2 * ((i + guard_x) * mesh_ny + j + guard_y) + facet
+            step_x, step_y = facet_gradient(heights, i, j, facet, periodic)
+            (
+                place[KX], place[KY], place[KZ], place[SX], place[SY], place[SZ],
+                _, cos_beta[k, bounces], turn[k, bounces, 0], turn[k, bounces, 1],
+            ) = bounce(
+                place[KX], place[KY], place[KZ], place[SX], place[SY], place[SZ],
+                step_x / pitch_x, step_y / pitch_y,
+            )  # fmt: skip
+            cell[k, BOUNCES] = bounces + 1
+        else:
+            # Nothing was hit: the ray rises above the surface, or leaves the mesh below it
+            t = leave_domain(
+                pitch_x, pitch_y, cell[k, CELL_I], cell[k, CELL_J], place,
+                -guard_x, -guard_y, nx + guard_x, ny + guard_y,
+            )  # fmt: skip
+            height = place[Z] + place[KZ] * t if place[KZ] != 0.0 else place[Z]
+            if place[KZ] > 0.0 and height >= z_top:
+                end = N_ESCAPED if bounces > 0 else N_LEAKED
+            elif not periodic:
+                end = N_SIDE
+            elif height < z_bottom:
+                end = N_LEAKED
+            else:
+                # Onwards from the same place one period back
+                x = (cell[k, CELL_I] + place[U] + place[KX] * t / pitch_x) % nx
+                y = (cell[k, CELL_J] + place[V] + place[KY] * t / pitch_y) % ny
+                cell[k, CELL_I] = min(int(x), nx - 1)
+                cell[k, CELL_J] = min(int(y), ny - 1)
+                cell[k, FACET] = -1
+                cell[k, FACE] = -1
+                place[U] = x - cell[k, CELL_I]
+                place[V] = y - cell[k, CELL_J]
+                place[Z] = height
+        if end < 0:
+            active[kept] = k
+            kept += 1
+            continue
+        turn[k, bounces, 0], turn[k, bounces, 1] = exit_turn(
+            place[KX], place[KY], place[KZ], place[SX], place[SY], place[SZ],
+            place[COS_PHI], place[SIN_PHI],
+        )  # fmt: skip
+        tally_path(
+            end, cos_beta[k], turn[k], bounces, place[KX], place[KY], place[KZ],
+            place[COS_PHI], place[SIN_PHI], n, kappa, n_stokes, mueller, brdf, energy, counts,
+        )  # fmt: skip
+    return kept
