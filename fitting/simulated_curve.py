@@ -56,9 +56,8 @@ class SimulatedCurve:
             msg = f"theta_i must be one of {simulated} [rad], got {theta_i:.6g}."
             raise ValueError(msg)
         order = ("theta_s", "dphi", "stokes_out", "stokes_in")
-        value = here.brdf.sum("bounces").transpose(*order).values
-        # Bounces of one ray are tallied apart; their errors are nearly independent
-        variance = (here.brdf_stderr**2).sum("bounces").transpose(*order).values
+        value = here.brdf_total.transpose(*order).values
+        variance = (here.brdf_total_stderr**2).transpose(*order).values
         theta = here.theta_s.values
         theta_s, dphi = np.broadcast_arrays(
             np.asarray(theta_s, float), np.asarray(dphi, float)

@@ -1,0 +1,135 @@
+"""The fitted microfacet model as a TOML file that can be loaded again."""
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from data_io._write import complete_file
+from pbrdf.errors import DataFileError
+
+if TYPE_CHECKING:
+    from pbrdf.analytic import MicrofacetModel
+
+__all__ = ["read_model", "write_model"]
+
+# In the file an angle carries its unit, and so is in degrees
+_ANGLES = {"shadow_omega_deg": "shadow_omega", "shadow_tau_deg": "shadow_tau"}
+_MODEL_KEYS = {
+    "slope_rms", "slope_distribution", "shadowing", "specular_gain", "diffuse_albedo",
+    *_ANGLES,
+}  # fmt: skip
+_MATERIAL_KEYS = {"n", "kappa", "name"}
+
+
+def write_model(
+    model: "MicrofacetModel", path: str | Path, *, notes: Mapping[str, Any] | None = None
+) -> None:
+    """Write a model with a constant index, and beside it what else should be remembered.
+
+    Parameters
+    ----------
+    model : MicrofacetModel
+        Its material must be constant: a fit holds at its wavelength.
+    path : str or Path
+        The file; appears whole or not at all.
+    notes : mapping, optional
+        Further tables of the file, such as uncertainties; `read_model` leaves them alone.
+
+    Raises
+    ------
+    ValueError
+        If the index is tabulated.
+    """
+    import tomli_w
+
+    material = model.material
+    if callable(material.n) or callable(material.kappa):
+        msg = (
+            "material must have a constant index to be written, got a table. "
+            "Use Material(*material.index(wavelength))."
+        )
+        raise ValueError(msg)
+    slopes = np.asarray(model.slope_rms).tolist()
+    table = {
+        "slope_rms": slopes,
+        "slope_distribution": model.slope_distribution,
+        "shadowing": model.shadowing,
+        "specular_gain": float(model.specular_gain),
+        "diffuse_albedo": float(model.diffuse_albedo),
+    }
+    if model.shadowing == "maxwell-beard":
+        table |= {
+            key: float(np.rad2deg(getattr(model, name))) for key, name in _ANGLES.items()
+        }
+    index: dict[str, Any] = {} if material.name is None else {"name": material.name}
+    index |= {"n": float(material.n), "kappa": float(material.kappa)}
+    text = tomli_w.dumps({"model": table, "material": index, **(notes or {})})
+    with complete_file(path) as stage:
+        stage.write_text(text, encoding="utf-8")
+
+
+def read_model(path: str | Path) -> "MicrofacetModel":
+    """Read the model that `write_model` or `pbrdf pipeline` wrote.
+
+    Raises
+    ------
+    DataFileError
+        If the file is not TOML, or a key is missing, unknown or has a wrong value.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pbrdf import Material, MicrofacetModel
+    >>> model = MicrofacetModel(Material(1.53), slope_rms=0.252, specular_gain=0.8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_model(model, Path(folder) / "model.toml")
+    ...     read_model(Path(folder) / "model.toml") == model
+    True
+    """
+    from pbrdf.analytic import MicrofacetModel
+    from pbrdf.optics.materials import Material
+
+    source = Path(path)
+    document = _load(source)
+    table = _table(document, "model", _MODEL_KEYS, {"slope_rms"}, source)
+    index = _table(document, "material", _MATERIAL_KEYS, {"n"}, source)
+    for key, name in _ANGLES.items():
+        if key in table:
+            table[name] = np.deg2rad(table.pop(key))
+    if isinstance(table["slope_rms"], list):
+        table["slope_rms"] = tuple(table["slope_rms"])
+    try:
+        return MicrofacetModel(Material(**index), **table)
+    except (TypeError, ValueError) as error:
+        problem, _, cure = str(error).partition(". ")
+        raise DataFileError(source, problem, cure or "Mend the value.") from error
+
+
+def _load(source: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(source.read_text(encoding="utf-8"))
+    except UnicodeDecodeError as error:
+        problem = "expected a text file, got other bytes"
+        raise DataFileError(source, problem, "A model is a TOML file in UTF-8.") from error
+    except tomllib.TOMLDecodeError as error:
+        problem = f"expected TOML: {error}"
+        raise DataFileError(source, problem, "Mend the line named.") from error
+
+
+def _table(
+    document: Mapping[str, Any], name: str, known: set[str], needed: set[str], source: Path
+) -> dict[str, Any]:
+    table = document.get(name)
+    if not isinstance(table, dict):
+        raise DataFileError(
+            source, f"expected a table [{name}], got none", "A model needs it."
+        )
+    for key in table.keys() - known:
+        cure = f"Known: {', '.join(sorted(known))}."
+        raise DataFileError(source, "unknown key", cure, column=f"[{name}] {key}")
+    for key in needed - table.keys():
+        raise DataFileError(source, "missing key", "Give it.", column=f"[{name}] {key}")
+    return dict(table)
