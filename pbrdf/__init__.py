@@ -3,6 +3,7 @@
 __version__ = "0.1.0"
 
 from pbrdf import materials
+from pbrdf.analytic import MicrofacetModel
 from pbrdf.errors import AccuracyWarning, DataFileError
 from pbrdf.optics.materials import Material
 from pbrdf.scene import Scene, load_scene
@@ -15,6 +16,7 @@ __all__ = [
     "GaussianSurface",
     "HeightMap",
     "Material",
+    "MicrofacetModel",
     "Scene",
     "load_scene",
     "materials",

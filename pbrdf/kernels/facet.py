@@ -18,7 +18,15 @@ from math import cos, sin, sqrt
 from . import jit
 from .fresnel import select
 
-__all__ = ["Directions", "Facet", "directions", "mirror_facet", "rotated_elements"]
+__all__ = [
+    "Directions",
+    "Facet",
+    "directions",
+    "fill_rotations",
+    "frame_rotations",
+    "mirror_facet",
+    "rotated_elements",
+]
 
 # Squared sine of 2 beta below which the plane of incidence is undefined
 DEGENERATE = 1e-290
@@ -128,3 +136,23 @@ def rotated_elements(way, a, b, c, d):
         ),
         (0.0, -d * sin_2i, d * cos_2i, c),
     )
+
+
+@jit
+def write_rotation(cos_2a, sin_2a, out):
+    """Write the Mueller rotation R(a), equation (11)."""
+    out[:, :] = 0.0
+    out[0, 0] = out[3, 3] = 1.0
+    out[1, 1] = out[2, 2] = cos_2a
+    out[1, 2] = sin_2a
+    out[2, 1] = -sin_2a
+
+
+@jit
+def fill_rotations(theta_i, theta_s, dphi, turn_i, turn_s):
+    """Fill R(alpha_i) and R(alpha_s), from the meridian frames into that of the facet."""
+    for k in range(theta_i.size):
+        way = directions(theta_i[k], theta_s[k], dphi[k], 0.0)
+        cos_2i, sin_2i, cos_2s, sin_2s = frame_rotations(way)
+        write_rotation(cos_2i, sin_2i, turn_i[k])
+        write_rotation(cos_2s, sin_2s, turn_s[k])

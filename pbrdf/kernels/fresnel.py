@@ -19,6 +19,9 @@ from math import inf, sqrt
 from . import jit
 
 __all__ = [
+    "fill_amplitudes",
+    "fill_reflection",
+    "fill_transmission",
     "reflection_amplitudes",
     "reflection_elements",
     "select",
@@ -164,3 +167,36 @@ def transmission_elements(cos_beta, n, kappa):
         mean * ratio.real,
         -mean * ratio.imag,
     )
+
+
+@jit
+def write_facet_matrix(a, b, c, d, out):
+    """Write [[A, B], [B, A]] and [[C, -D], [D, C]] into a zeroed 4x4 matrix."""
+    out[0, 0] = out[1, 1] = a
+    out[0, 1] = out[1, 0] = b
+    out[2, 2] = out[3, 3] = c
+    out[2, 3] = -d
+    out[3, 2] = d
+
+
+@jit
+def fill_reflection(cos_beta, n, kappa, out):
+    """Fill out[k] with the reflection matrix of interface k."""
+    for k in range(cos_beta.size):
+        a, b, c, d = reflection_elements(cos_beta[k], n[k], kappa[k])
+        write_facet_matrix(a, b, c, d, out[k])
+
+
+@jit
+def fill_transmission(cos_beta, n, kappa, out):
+    """Fill out[k] with the transmission matrix of interface k."""
+    for k in range(cos_beta.size):
+        a, b, c, d = transmission_elements(cos_beta[k], n[k], kappa[k])
+        write_facet_matrix(a, b, c, d, out[k])
+
+
+@jit
+def fill_amplitudes(cos_beta, n, kappa, out):
+    """Fill out[0] with r_s and out[1] with r_p."""
+    for k in range(cos_beta.size):
+        out[0, k], out[1, k] = reflection_amplitudes(cos_beta[k], n[k], kappa[k])
