@@ -1,0 +1,148 @@
+"""Statistics along one axis from the fit of its structure function."""
+
+import numpy as np
+
+from fitting.estimate import Estimate
+from fitting.statistics_fit import AxisData, AxisFit, fit_axis
+from fitting.statistics_models import GAUSSIAN
+from fitting.statistics_result import Autocorrelation, AxisStatistics
+from fitting.statistics_spectrum import measured_cutoff
+
+Array = np.ndarray
+
+# Fits whose misfit exceeds this describe no more than their shortest lags
+_HOPELESS = 60.0
+
+
+def axis_statistics(
+    name: str, data: AxisData, across: float, losses: Array | None
+) -> AxisStatistics:
+    """Fit one axis and read its statistics off.
+
+    Parameters
+    ----------
+    name : str
+        ``x`` or ``y``.
+    data : AxisData
+        Structure function, rounding and removed form.
+    across : float
+        Inverse number of independent lines, 1 for a profile.
+    losses : ndarray or None
+        Shares of variance that the form takes across the axis, for a map.
+    """
+    fit = fit_axis(data, across=across, losses_across=losses)
+    inflation, form = 1.0, fit.correlation.form
+    if fit.misfit > _HOPELESS:
+        # No form describes the whole curve; near lag 0 every smooth one is alike
+        form, inflation = "other", fit.misfit / fit.increments.lags.size
+        fit = fit_axis(
+            data, across=across, losses_across=losses, families=(GAUSSIAN,), reach=0.5
+        )
+    sampling = data.sampling
+    disturbance = fit.noise + data.step**2 / 12
+    cutoff = measured_cutoff(
+        lambda f: fit.variance * fit.correlation.spectrum(f),
+        disturbance,
+        sampling.spacing,
+        fit.correlation.corr_length,
+    )
+    # A smooth form has a slope of its own; a jagged one only down to a wavelength
+    band = cutoff if fit.correlation.form == "matern" else 0.0
+    length_variance = fit.log_variance(lambda t: fit.correlation_at(t).corr_length)
+    corr_length = fit.correlation.corr_length
+    if form == "other":
+        corr_length = _measured_fall(fit, data)
+    return AxisStatistics(
+        axis=name,
+        corr_length=Estimate.positive(corr_length, inflation * length_variance),
+        slope_rms=_derivative_rms(fit, band, 1, inflation),
+        curvature_rms=_derivative_rms(fit, band, 2, inflation),
+        cutoff=cutoff,
+        autocorrelation=_describe(form, fit, data),
+        spacing=float(sampling.spacing),
+        length=float(sampling.length),
+        plain_corr_length=float(sampling.first_fall()),
+        fit=fit,
+    )
+
+
+def _derivative_rms(
+    fit: AxisFit, band: float, derivative: int, inflation: float
+) -> Estimate:
+    def variance(parameters: Array) -> float:
+        correlation = fit.correlation_at(parameters)
+        return float(np.exp(parameters[0])) * correlation.band_variance(band, derivative)
+
+    value = variance(fit.parameters)
+    return Estimate.root_mean_square(
+        float(np.sqrt(value)), inflation * fit.log_variance(variance)
+    )
+
+
+def _measured_fall(fit: AxisFit, data: AxisData) -> float:
+    """Lag where the measured autocorrelation, cleared of noise, falls to 1/e. [um]"""
+    true = max(fit.mean_square - fit.noise - data.step**2 / 12, 1e-3 * fit.mean_square)
+    found = data.sampling.increments(data.sampling.longest_lag, 200)
+    rho = 1 - (found.mean_square - 2 * (fit.noise + data.step**2 / 12)) / (2 * true)
+    below = np.flatnonzero(rho < np.exp(-1))
+    if below.size == 0:
+        return data.sampling.longest_lag
+    i = int(below[0])
+    if i == 0:
+        return float(found.lags[0])
+    share = (rho[i - 1] - np.exp(-1)) / (rho[i - 1] - rho[i])
+    return float(found.lags[i - 1] + share * (found.lags[i] - found.lags[i - 1]))
+
+
+def _describe(form: str, fit: AxisFit, data: AxisData) -> Autocorrelation:
+    correlation = fit.correlation
+    found = data.sampling.increments(3 * correlation.corr_length, 40)
+    measured = 1 - (found.mean_square / 2 - fit.noise - data.step**2 / 12) / fit.variance
+    texts = {
+        "gaussian": "Gaussian, exp(-r²/l²)",
+        "two-scale": "two Gaussian scales, {long_length:.3g} um and {short_length:.3g} um "
+        "with {short_share:.2g} of the variance",
+        "matern": "Matérn of smoothness {smoothness:.2g} (0.5: exponential, large: Gaussian)",
+        "other": "none of Gaussian, Matérn and two-scale",
+    }
+    parameters = {} if form == "other" else correlation.parameters
+    return Autocorrelation(
+        form=form,
+        description=texts[form].format(**parameters),
+        parameters=parameters,
+        lag=np.concatenate([[0.0], found.lags]),
+        measured=np.concatenate([[1.0], measured]),
+        fitted=correlation.rho(np.concatenate([[0.0], found.lags])),
+    )
+
+
+def height_rms(fits: list[AxisFit], step: float) -> Estimate:
+    """Root mean square of the true heights, from their mean square, not from the form."""
+    squares, variances = [], []
+    for fit in fits:
+        left = fit.mean_square - fit.noise - step**2 / 12
+        squares.append(max(left, 1e-3 * fit.mean_square) / (1 - fit.loss))
+        variances.append(_height_log_variance(fit, squares[-1], fit.loss))
+    return Estimate.root_mean_square(
+        float(np.sqrt(np.mean(squares))), float(np.mean(variances))
+    )
+
+
+def _height_log_variance(fit: AxisFit, square: float, loss: float) -> float:
+    """Variance of ln height² through the mean square, the noise and the loss."""
+    gradient = -fit.response[-1] * fit.mean_square / (square * (1 - loss))
+    gradient[0] += 1 / (square * (1 - loss))
+    # The loss grows in proportion to the correlation length
+    by_length = np.zeros(fit.parameters.size)
+    for i in range(fit.parameters.size):
+        shift = np.zeros(fit.parameters.size)
+        shift[i] = 1e-4
+        by_length[i] = (
+            np.log(
+                fit.correlation_at(fit.parameters + shift).corr_length
+                / fit.correlation_at(fit.parameters - shift).corr_length
+            )
+            / 2e-4
+        )
+    gradient = gradient + loss / (1 - loss) * by_length @ fit.response
+    return float(gradient @ fit.covariance @ gradient)

@@ -1,0 +1,321 @@
+"""The fit along one axis: height variance, form of the autocorrelation, and noise.
+
+Sample structure function and mean square height are compared with what a model surface
+would give after the same noise, rounding and form removal. The weights come from the
+theoretical covariance of the samples, softened so that the fit rests on the bulk of the
+structure function: the exact optimum would put its trust in the last digits of smooth data.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize
+
+from fitting.statistics_lags import Increments, Sampling
+from fitting.statistics_models import FAMILIES, GAUSSIAN, Correlation, Family
+from fitting.statistics_quantisation import Rounding
+from fitting.statistics_variance import (
+    Extent,
+    form_losses,
+    increment_covariance,
+)
+
+Array = np.ndarray
+
+# Lags reach this many correlation lengths: beyond, the structure function is a plateau
+REACH = 1.5
+N_LAGS = 14
+# Share of each standard deviation added to the diagonal of the covariance
+_SOFTENING = 0.3
+# Drop of the misfit, in chi-squared units, that a form with more parameters must bring
+_DROP_PER_PARAMETER = 7.0
+_MAX_ROUNDS = 8
+
+
+@dataclass(frozen=True)
+class AxisData:
+    """What is known of one axis before the fit.
+
+    Parameters
+    ----------
+    sampling : Sampling
+        Structure function of the residual heights.
+    step : float
+        Rounding step. [um]
+    form_increments : callable
+        Increments of the removed form at given lags, shape (n_samples, n_lags). [um]
+    degree : int
+        Of the removed form.
+    n_terms : int
+        Its number of coefficients.
+    """
+
+    sampling: Sampling
+    step: float
+    form_increments: Callable[[Array], Array]
+    degree: int
+    n_terms: int
+
+
+@dataclass(frozen=True)
+class AxisFit:
+    """Fitted surface along one axis, able to propagate its errors to any quantity.
+
+    Parameters
+    ----------
+    correlation : Correlation
+        Fitted autocorrelation.
+    variance, noise : float
+        Of heights in the fitted model, and of white noise. [um²]
+    parameters : ndarray, shape (p,)
+        ln variance, the family's own, noise / mean square height.
+    response : ndarray, shape (p, n + 1)
+        d parameters / d (mean square height, increments).
+    covariance : ndarray, shape (n + 1, n + 1)
+        Of (mean square height, increments). [um⁴]
+    increments : Increments
+        What was fitted.
+    modelled : ndarray, shape (n + 1,)
+        Mean square height and increments of the fitted model. [um²]
+    misfit : float
+        Weighted sum of squares.
+    extent : Extent
+        Length and independent lines.
+    mean_square : float
+        Of the residual heights. [um²]
+    loss : float
+        Share of the height variance that form removal takes. [1]
+    """
+
+    family: Family
+    correlation: Correlation
+    variance: float
+    noise: float
+    parameters: Array
+    response: Array
+    covariance: Array
+    increments: Increments
+    modelled: Array
+    misfit: float
+    extent: Extent
+    mean_square: float
+    loss: float
+
+    def log_variance(
+        self, quantity: Callable[[Array], float], direct: float = 0.0
+    ) -> float:
+        """Variance of ln(quantity(parameters) · mean_square^direct), to first order."""
+        gradient = _gradient(lambda t: np.log(quantity(t)), self.parameters) @ self.response
+        gradient[0] += direct / self.mean_square
+        return float(gradient @ self.covariance @ gradient)
+
+    def correlation_at(self, parameters: Array) -> Correlation:
+        """Autocorrelation for another parameter vector."""
+        return self.family.build(parameters[1:-1])
+
+    @property
+    def noise_stderr(self) -> float:
+        """Standard error of the noise variance. [um²]"""
+        row = self.response[-1]
+        return float(np.sqrt(row @ self.covariance @ row)) * self.mean_square
+
+
+def fit_axis(
+    data: AxisData,
+    *,
+    across: float = 1.0,
+    families: Sequence[Family] = FAMILIES,
+    losses_across: Array | None = None,
+    reach: float = REACH,
+) -> AxisFit:
+    """Fit each family and keep the simplest that the data do not reject.
+
+    Parameters
+    ----------
+    data : AxisData
+        Structure function, rounding and removed form.
+    across : float
+        Inverse number of independent lines (1 for a profile).
+    families : sequence of Family
+        Candidates; the first is preferred unless another fits clearly better.
+    losses_across : ndarray, optional
+        Shares that the form's terms take across the axis, for a map.
+    reach : float
+        Longest lag, in correlation lengths.
+    """
+    problem = _Problem(data, across, losses_across, reach)
+    best = problem.solve(families[0], problem.pilot())
+    for family in families[1:]:
+        # No form can drop the misfit by more than all of it
+        if best.misfit < _DROP_PER_PARAMETER:
+            break
+        other = problem.compare(family, best)
+        extra = len(family.starts(1.0)[0]) - len(best.family.starts(1.0)[0])
+        if best.misfit - other.misfit > _DROP_PER_PARAMETER * max(extra, 0.2):
+            best = other
+    return best if best.family is families[0] else problem.solve(best.family, best)
+
+
+@dataclass
+class _Start:
+    """Where a fit starts: parameters of a family, on the scale of the data."""
+
+    family: Family
+    correlation: Correlation
+    variance: float
+    noise: float
+
+
+class _Problem:
+    """One axis: model of the data, its weights, and the solver."""
+
+    def __init__(
+        self, data: AxisData, across: float, losses_across: Array | None, reach: float
+    ) -> None:
+        self.data = data
+        self.reach = reach
+        sampling = data.sampling
+        self.mean_square = sampling.variance
+        self.extent = Extent(sampling.length, sampling.n_points, across)
+        self.losses_across = losses_across
+
+    def pilot(self) -> _Start:
+        """Guess from the plain autocorrelation; the rounds below mend it."""
+        length = min(self.data.sampling.first_fall(), self.extent.length / 4)
+        noise = 1e-3 * self.mean_square
+        return _Start(
+            GAUSSIAN, GAUSSIAN.build(np.array([np.log(length)])), self.mean_square, noise
+        )
+
+    def solve(self, family: Family, start: "_Start | AxisFit") -> AxisFit:
+        """Fit, renewing lags and weights until the correlation length settles."""
+        starts: list[list[float]] | None = None
+        if isinstance(start, AxisFit):
+            starts = [list(start.parameters[1:-1])]
+        for _ in range(_MAX_ROUNDS):
+            self._set_weights(start)
+            fit = self._minimise(family, start, starts)
+            change = abs(
+                np.log(fit.correlation.corr_length / start.correlation.corr_length)
+            )
+            starts, start = [fit.parameters[1:-1].tolist()], fit
+            if change < 2e-3:
+                break
+        self._set_weights(fit)
+        return self._with_errors(fit)
+
+    def compare(self, family: Family, reference: AxisFit) -> AxisFit:
+        """Fit another family to the same lags with the same weights."""
+        self._set_weights(reference)
+        fit = self._minimise(family, reference, None)
+        return fit
+
+    def _set_weights(self, at: "_Start | AxisFit") -> None:
+        data, correlation = self.data, at.correlation
+        length = float(np.clip(correlation.corr_length, 0, self.extent.length / 3))
+        self.found = data.sampling.increments(self.reach * length, N_LAGS)
+        lags = self.found.lags
+        self.rounding = Rounding.of_form(
+            data.step, data.form_increments(lags) if data.step > 0 else np.zeros((1, 0))
+        )
+        covariance = increment_covariance(
+            lags,
+            correlation.rho,
+            length,
+            (at.variance, at.noise + self.rounding.variance),
+            self.extent,
+        )
+        true = 2 * at.variance * (1 - correlation.rho(lags)) + 2 * at.noise
+        gain = np.concatenate([[1.0], self.rounding.gain(true)])
+        # Rounding noise is white in the covariance, so its own gain is in there already
+        self.covariance = covariance * np.outer(gain, gain) if data.step > 0 else covariance
+        softened = self.covariance + np.diag(_SOFTENING**2 * np.diag(self.covariance))
+        self.factor = np.linalg.cholesky(np.linalg.inv(softened)).T
+
+    def model(self, family: Family, parameters: Array) -> Array:
+        """Return the expected mean square height and increments. [um²]"""
+        variance = np.exp(parameters[0])
+        noise = parameters[-1] * self.mean_square
+        correlation = family.build(parameters[1:-1])
+        true = 2 * variance * (1 - correlation.rho(self.found.lags)) + 2 * noise
+        share = 1 - self.loss(correlation)
+        left = 1 - self.data.n_terms / self.extent.n_points
+        mean_square = variance * share + noise * left + self.rounding.variance
+        return np.concatenate([[mean_square], self.rounding.increments(true)])
+
+    def loss(self, correlation: Correlation) -> float:
+        """Share of the height variance that form removal takes, in expectation."""
+        along = form_losses(
+            correlation.rho, correlation.corr_length, self.extent.length, self.data.degree
+        )
+        if self.losses_across is None:
+            return float(min(along.sum(), 0.9))
+        across = self.losses_across
+        total = sum(along[i] * across[: along.size - i].sum() for i in range(along.size))
+        return float(min(total, 0.9))
+
+    def _minimise(
+        self, family: Family, start: "_Start | AxisFit", starts: list[list[float]] | None
+    ) -> AxisFit:
+        length = start.correlation.corr_length
+        low, high = family.limits(length)
+        observed = np.concatenate([[self.mean_square], self.found.mean_square])
+        noise = np.clip(start.noise / self.mean_square, 1e-6, 0.9)
+        lower = np.array([np.log(self.mean_square * 1e-6), *low, 0.0])
+        upper = np.array([np.log(self.mean_square * 1e3), *high, 1.0])
+        solutions = []
+        for own in starts or family.starts(length):
+            guess = np.clip(
+                [np.log(start.variance), *own, noise], lower + 1e-9, upper - 1e-9
+            )
+            solutions.append(
+                optimize.least_squares(
+                    lambda t: self.factor @ (observed - self.model(family, t)),
+                    guess,
+                    bounds=(lower, upper),
+                    x_scale=[*[0.1] * (guess.size - 1), 0.01],
+                    max_nfev=60,
+                )
+            )
+        best = min(solutions, key=lambda solution: solution.cost)
+        found = best.x
+        return AxisFit(
+            family=family,
+            correlation=family.build(found[1:-1]),
+            variance=float(np.exp(found[0])),
+            noise=float(found[-1] * self.mean_square),
+            parameters=found,
+            response=np.zeros((found.size, observed.size)),
+            covariance=self.covariance,
+            increments=self.found,
+            modelled=self.model(family, found),
+            misfit=float(2 * best.cost),
+            extent=self.extent,
+            mean_square=self.mean_square,
+            loss=self.loss(family.build(found[1:-1])),
+        )
+
+    def _with_errors(self, fit: AxisFit) -> AxisFit:
+        """Refit once on the final weights and derive the response to the data."""
+        fit = self._minimise(fit.family, fit, [list(fit.parameters[1:-1])])
+        jacobian = self.factor @ _jacobian(
+            lambda t: self.model(fit.family, t), fit.parameters
+        )
+        response = np.linalg.pinv(jacobian, rcond=1e-9) @ self.factor
+        return AxisFit(**{**fit.__dict__, "response": response})
+
+
+def _jacobian(function: Callable[[Array], Array], at: Array) -> Array:
+    """Central differences, columns by parameter."""
+    steps = np.full(at.size, 1e-4)
+    columns = []
+    for i, step in enumerate(steps):
+        shift = np.zeros(at.size)
+        shift[i] = step
+        columns.append((function(at + shift) - function(at - shift)) / (2 * step))
+    return np.column_stack(columns)
+
+
+def _gradient(function: Callable[[Array], float], at: Array) -> Array:
+    return _jacobian(lambda t: np.array([function(t)]), at)[0]
