@@ -1,0 +1,187 @@
+"""Zemax tabular BSDF files (.bsdf): scatter angles relative to the specular ray.
+
+ScatterRadial is the angle from the specular ray, ScatterAzimuth turns about it, from the
+direction towards the surface normal. Directions below the horizon are dropped; a value of
+exactly 0 above it means that nothing was measured there, and becomes NaN.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from data_io._text import Line, is_comment, is_number
+from data_io.goniometer.scan import Scan
+from pbrdf.errors import DataFileError
+
+_AXES = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
+_REQUIRED = {
+    "SpectralContent": ("Monochrome",),
+    "ScatterType": ("BRDF",),
+    "Symmetry": ("PlaneSymmetrical", "ASymmetrical", "Asymmetrical"),
+}
+_NANOMETRES = re.compile(r"(\d+(?:\.\d+)?)\s*nm\b")
+
+
+def looks_like(content: list[Line]) -> bool:
+    """Tell whether the lines without comments are a Zemax table."""
+    return any(line.text.split()[:1] == ["ScatterRadial"] for line in content)
+
+
+def read(path: Path, lines: list[Line]) -> Scan:
+    """Read the table of one sample rotation."""
+    comments = [line.text.strip("# \t") for line in lines if is_comment(line)]
+    content = [line for line in lines if line.text.strip() and not is_comment(line)]
+    begin = next((i for i, line in enumerate(content) if _word(line) == "DataBegin"), None)
+    end = next((i for i, line in enumerate(content) if _word(line) == "DataEnd"), None)
+    if begin is None or end is None:
+        missing = "DataBegin" if begin is None else "DataEnd"
+        problem = f"expected a line {missing}, found none"
+        raise DataFileError(path, problem, "The file is truncated.")
+    axes = _header(path, content[:begin])
+    blocks, numbers = _values(path, content[begin + 1 : end], axes)
+    theta_i, azimuth, radial = np.meshgrid(
+        axes["AngleOfIncidence"],
+        axes["ScatterAzimuth"],
+        axes["ScatterRadial"],
+        indexing="ij",
+    )
+    theta_s, dphi = from_specular(
+        np.radians(theta_i), np.radians(radial), np.radians(azimuth)
+    )
+    # Half a microdegree keeps the horizon itself in spite of rounding
+    real = theta_s <= np.pi / 2 + 1e-8
+    measured = np.where(blocks == 0, np.nan, blocks)
+    wavelength = _wavelength(comments)
+    return Scan(
+        path=path,
+        lines=[int(n) for n in numbers[real]],
+        theta_i=theta_i[real],
+        theta_s=np.minimum(np.degrees(theta_s[real]), 90.0),
+        dphi=np.degrees(dphi[real]),
+        values={"M00": measured[real]},
+        wavelength=None if wavelength is None else np.full(int(real.sum()), wavelength),
+        names={"theta_i": "AngleOfIncidence", "theta_s": "ScatterRadial", "M00": "BRDF"},
+        attrs={
+            "format": "zemax",
+            "title": next((c for c in comments if c.startswith("Sample")), path.stem),
+            "comments": "\n".join(c for c in comments if c.strip("=")),
+            "not_measured": int(np.isnan(measured[real]).sum()),
+            "below_horizon": int((~real).sum()),
+        },
+    )
+
+
+def from_specular(
+    theta_i: np.ndarray, radial: np.ndarray, azimuth: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return zenith and dphi of directions given relative to the specular ray. [rad]
+
+    Azimuth 0 points from the specular ray towards the normal. The sense of the azimuth is
+    that in which phi_s rises from forward; scalar BRDFs of isotropic samples do not depend
+    on it.
+
+    Examples
+    --------
+    Ten degrees towards the normal from the specular ray at 30 degrees, then 40 degrees,
+    which crosses to the source side:
+
+    >>> angles = from_specular(np.radians(30), np.radians([10, 40]), np.zeros(2))
+    >>> np.degrees(angles).round(9)
+    array([[ 20.,  10.],
+           [180.,   0.]])
+    """
+    # Components along the incident azimuth x, across it y, and along the normal z
+    forward = np.cos(radial) * np.sin(theta_i) - np.sin(radial) * np.cos(azimuth) * np.cos(
+        theta_i
+    )
+    across = np.sin(radial) * np.sin(azimuth)
+    up = np.cos(radial) * np.cos(theta_i) + np.sin(radial) * np.cos(azimuth) * np.sin(
+        theta_i
+    )
+    theta_s = np.arctan2(np.hypot(forward, across), up)
+    # Rounding must not decide the azimuth in plane or at the normal
+    across = np.where(np.abs(across) < 1e-12, 0.0, across)
+    forward = np.where(np.abs(forward) < 1e-12, 0.0, forward)
+    dphi = np.mod(np.arctan2(across, forward) + np.pi, 2 * np.pi)
+    return theta_s, dphi
+
+
+def _word(line: Line) -> str:
+    return line.text.split()[0]
+
+
+def _wavelength(comments: list[str]) -> float | None:
+    """Return the wavelength that the comments name, if they name exactly one. [um]"""
+    found = {float(value) for text in comments for value in _NANOMETRES.findall(text)}
+    return found.pop() * 1e-3 if len(found) == 1 else None
+
+
+def _header(path: Path, header: list[Line]) -> dict[str, np.ndarray]:
+    """Return the values of the four axes. [deg]"""
+    axes: dict[str, np.ndarray] = {}
+    for line, following in zip(header, [*header[1:], None], strict=True):
+        cells = line.text.split()
+        if cells[0] in _REQUIRED and cells[1:2] and cells[1] not in _REQUIRED[cells[0]]:
+            problem = f"expected {_REQUIRED[cells[0]][0]}, got {cells[1]!r}"
+            cure = "Only monochrome reflection tables of one sample rotation can be read."
+            raise DataFileError(path, problem, cure, line=line.number, column=cells[0])
+        if cells[0] in _AXES:
+            values = _numbers(path, following or line, cells[0])
+            if len(cells) != 2 or cells[1] != str(values.size):
+                problem = (
+                    f"expected {' '.join(cells[1:])} values as announced, got {values.size}"
+                )
+                raise DataFileError(
+                    path,
+                    problem,
+                    "The header is damaged.",
+                    line=line.number,
+                    column=cells[0],
+                )
+            axes[cells[0]] = values
+    for name in _AXES[1:]:
+        if name not in axes:
+            problem = "expected this axis in the header, found none"
+            raise DataFileError(path, problem, "The header is damaged.", column=name)
+    if axes.get("SampleRotation", np.zeros(1)).size != 1:
+        problem = f"expected one rotation, got {axes['SampleRotation'].size}"
+        cure = "Split the file; the measured sample counts as isotropic."
+        raise DataFileError(path, problem, cure, column="SampleRotation")
+    return axes
+
+
+def _numbers(path: Path, line: Line, column: str) -> np.ndarray:
+    cells = line.text.split()
+    for cell in cells:
+        if not is_number(cell) or not np.isfinite(float(cell)):
+            problem = f"expected a finite number, got {cell!r}"
+            cure = "Write 0 for what was not measured."
+            raise DataFileError(path, problem, cure, line=line.number, column=column)
+    return np.array([float(cell) for cell in cells])
+
+
+def _values(
+    path: Path, data: list[Line], axes: dict[str, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the table, shape (incidence, azimuth, radial), and the line of each value."""
+    shape = tuple(axes[name].size for name in _AXES[1:])
+    rows, numbers = [], []
+    for line in data:
+        if _word(line) == "TIS":
+            continue
+        values = _numbers(path, line, "BRDF")
+        if values.size != shape[2]:
+            problem = f"expected {shape[2]} values, one a ScatterRadial, got {values.size}"
+            raise DataFileError(path, problem, "The row is truncated.", line=line.number)
+        rows.append(values)
+        numbers.append(line.number)
+    if len(rows) != shape[0] * shape[1]:
+        problem = (
+            f"expected {shape[0]} x {shape[1]} rows, incidence x azimuth, got {len(rows)}"
+        )
+        raise DataFileError(path, problem, "The table is truncated or has extra rows.")
+    return (
+        np.array(rows).reshape(shape),
+        np.broadcast_to(np.array(numbers).reshape(shape[0], shape[1], 1), shape),
+    )
