@@ -6,7 +6,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from fitting.objective import Curve, Objective
+from fitting.objective import Prediction, Objective
 from fitting.solution import Solution, better, early_end
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["solve_casadi"]
 
-_SOLVERS: "WeakKeyDictionary[Curve, dict[str, casadi.Function]]" = WeakKeyDictionary()
+_SOLVERS: "WeakKeyDictionary[Prediction, dict[str, casadi.Function]]" = WeakKeyDictionary()
 
 _IPOPT_OPTIONS = {
     "print_time": False,
@@ -66,7 +66,7 @@ def solve_casadi(objective: Objective, *, max_iterations: int = 500) -> Solution
     ended = early_end(objective, "casadi")
     if ended is not None:
         return ended
-    if objective.curve.is_linear and objective.loss == "linear":
+    if objective.prediction.is_linear and objective.loss == "linear":
         return _solve_linear(objective)
     return _solve_ipopt(objective, max_iterations)
 
@@ -129,20 +129,19 @@ def _ipopt(objective: Objective, max_iterations: int) -> "casadi.Function":
     """Return the IPOPT solver of this curve and loss, built at the first use."""
     import casadi
 
-    cache = _SOLVERS.setdefault(objective.curve, {})
+    cache = _SOLVERS.setdefault(objective.prediction, {})
     key = f"{objective.loss} {max_iterations}"
     if key not in cache:
         expressions = objective.expressions
         n = expressions.x.numel()
         u, scale, norm = casadi.MX.sym("u", n), casadi.MX.sym("s", n), casadi.MX.sym("c")
-        cost, gauss_newton = casadi.substitute(
-            [expressions.cost, expressions.gauss_newton], [expressions.x], [u * scale]
-        )
+        cost = casadi.substitute(expressions.cost, expressions.x, u * scale)
         p = casadi.vertcat(expressions.p, scale, norm)
         options: dict[str, Any] = {**_IPOPT_OPTIONS, "ipopt.max_iter": max_iterations}
-        if not objective.curve.second_order:
+        if not objective.prediction.second_order:
             weight, none = casadi.MX.sym("w"), casadi.MX.sym("g", 0)
-            hessian = weight / norm * gauss_newton * (scale @ scale.T)
+            curvature = casadi.substitute(expressions.gauss_newton, expressions.x, u * scale)
+            hessian = weight / norm * curvature * (scale @ scale.T)
             options["hess_lag"] = casadi.Function(
                 "nlp_hess_l",
                 [u, p, weight, none],

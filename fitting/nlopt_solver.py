@@ -8,7 +8,7 @@ import numpy as np
 from fitting.objective import Objective
 from fitting.solution import Solution, better, early_end
 
-__all__ = ["solve_nlopt"]
+__all__ = ["search_nlopt", "solve_nlopt"]
 
 _REASONS = {
     1: "converged",
@@ -20,31 +20,20 @@ _REASONS = {
 }
 
 
-def solve_nlopt(
-    objective: Objective,
-    *,
-    search: str | None = None,
-    max_evaluations: int = 2000,
-    seed: int = 0,
-) -> Solution:
+def solve_nlopt(objective: Objective, *, max_evaluations: int = 2000) -> Solution:
     """Return the lowest minimum that nlopt [1]_ reaches from the start, inside the bounds.
 
     Two searches run from the start and the better one counts: SLSQP with the exact
     gradient, and Subplex without derivatives, then SLSQP; what traps one rarely traps both.
     SLSQP is repeated in variables in which the Gauss-Newton Hessian is the unit matrix, so
-    narrow valleys cost no digits. A global search goes before both.
+    narrow valleys cost no digits.
 
     Parameters
     ----------
     objective : Objective
         The problem.
-    search : {None, "crs", "mlsl"}
-        Global search first: controlled random search or multi-level single linkage with a
-        low-discrepancy sequence. Both need finite bounds.
     max_evaluations : int
         Limit of each stage.
-    seed : int
-        Seed of the random search.
 
     Returns
     -------
@@ -60,10 +49,8 @@ def solve_nlopt(
         return ended
     start = objective.start
     counts = [0]
-    if search is not None:
-        start = _search(objective, start, search, max_evaluations, seed, counts)
     best = _polish(objective, start, max_evaluations, counts)
-    if not objective.curve.is_linear:
+    if not objective.prediction.is_linear:
         detour = _simplex(objective, start, max_evaluations, counts)
         best = better(best, _polish(objective, detour, max_evaluations, counts))
     return replace(best, n_evaluations=counts[0])
@@ -240,38 +227,36 @@ def _simplex(
     return stage.best_x
 
 
-def _search(
-    objective: Objective,
-    x: np.ndarray,
-    search: str,
-    limit: int,
-    seed: int,
-    counts: list[int],
+def search_nlopt(
+    objective: Objective, search: str, *, max_evaluations: int = 5000, seed: int = 0
 ) -> np.ndarray:
-    """Search the whole box and return the best point."""
+    """Search the whole box of the bounds and return the best point, not yet polished.
+
+    Parameters
+    ----------
+    objective : Objective
+        The problem, all bounds finite.
+    search : {"crs", "mlsl"}
+        Controlled random search, or multi-level single linkage with a low-discrepancy
+        sequence and SLSQP.
+    max_evaluations : int
+        Limit of the search.
+    seed : int
+        Seed of its random numbers.
+    """
     import nlopt
 
-    algorithms = {"crs": nlopt.GN_CRS2_LM, "mlsl": nlopt.G_MLSL_LDS}
-    if search not in algorithms:
-        msg = (
-            f"search must be 'crs' or 'mlsl', got {search!r}. Without it the fit is local."
-        )
-        raise ValueError(msg)
-    open_ends = ~(np.isfinite(objective.low) & np.isfinite(objective.high))
-    if open_ends.any():
-        name = objective.parameters[int(np.argmax(open_ends))].name
-        msg = f"bounds of {name} must be finite for a search, got an open end. Give both."
-        raise ValueError(msg)
+    algorithm = {"crs": nlopt.GN_CRS2_LM, "mlsl": nlopt.G_MLSL_LDS}[search]
     nlopt.srand(seed + 1)
+    x = objective.start
     width = objective.high - objective.low
     sizes = np.where(width > 0.0, width, 1.0)
     stage = _Stage(objective, x, np.diag(sizes))
-    optimizer = _bounded(algorithms[search], objective, x, sizes, limit)
+    optimizer = _bounded(algorithm, objective, x, sizes, max_evaluations)
     if search == "mlsl":
         local = nlopt.opt(nlopt.LD_SLSQP, len(x))
         local.set_xtol_rel(1e-6)
         optimizer.set_local_optimizer(local)
     optimizer.set_xtol_rel(1e-6)
     stage.run(optimizer)
-    counts[0] += stage.count
     return stage.best_x

@@ -24,7 +24,7 @@ from fitting.parameters import Parameter
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["LOSSES", "Curve", "Objective"]
+__all__ = ["LOSSES", "Prediction", "Objective"]
 
 
 def _linear(z: Any) -> Any:
@@ -61,8 +61,18 @@ LOSSES: dict[str, Callable[[Any], Any]] = {
 }
 
 
+@lru_cache(maxsize=None)
+def _influence(loss: str) -> "casadi.Function":
+    """Return r -> (psi, d psi/dr) of a loss."""
+    import casadi
+
+    r = casadi.SX.sym("r")
+    psi = casadi.gradient(0.5 * LOSSES[loss](r**2), r)
+    return casadi.Function("influence", [r], [psi, casadi.gradient(psi, r)])
+
+
 @dataclass(frozen=True, eq=False)
-class Curve:
+class Prediction:
     """A predicted curve y(x) with derivatives, shared by all objectives built on it.
 
     Parameters
@@ -92,18 +102,21 @@ class Curve:
         if not self.second_order:
             return False
         x = casadi.MX.sym("x", self.function.size1_in(0))
-        jacobian = casadi.jacobian(self.function(x), x)
-        return not casadi.depends_on(jacobian, x)
+        weight = casadi.MX.sym("w", self.function.size1_out(0))
+        gradient = casadi.gradient(casadi.dot(weight, self.function(x)), x)
+        # The Hessian of any weighted sum has no entry at all
+        hessian = casadi.Function("gradient", [x, weight], [gradient]).jac_sparsity(0, 0)
+        return int(hessian.nnz()) == 0
 
-    # The cache belongs to the curve and dies with it
+    # The cache belongs to the prediction and dies with it
     @cached_property
     def expressions(self) -> "Callable[[str], Expressions]":
-        """Symbolic cost of this curve for a loss, built once for each loss."""
+        """Symbolic cost for a loss, built once for each loss."""
         return lru_cache(maxsize=None)(lambda loss: Expressions(self, loss))
 
 
 class Expressions:
-    """Cost of a curve as a casadi expression of x and of the numbers p it depends on.
+    """Cost of a prediction as a casadi expression of x and of the numbers p it depends on.
 
     Attributes
     ----------
@@ -111,51 +124,57 @@ class Expressions:
         p stacks data (m), 1/stderr (m), prior values (n) and 1/prior_stderr (n).
     value_gradient : casadi.Function
         (x, p) -> (cost, gradient).
-    gauss_newton : casadi.MX
-        J^T D J with D = rho'(r^2), the Hessian without the curvature of the model.
     """
 
-    def __init__(self, curve: Curve, loss: str) -> None:
+    def __init__(self, prediction: Prediction, loss: str) -> None:
         import casadi
 
-        m, n = curve.function.size1_out(0), curve.function.size1_in(0)
+        m, n = prediction.function.size1_out(0), prediction.function.size1_in(0)
+        self._prediction, self._rho = prediction, LOSSES[loss]
         self.x = casadi.MX.sym("x", n)
         self.p = casadi.MX.sym("p", 2 * m + 2 * n)
-        data, weight = self.p[:m], self.p[m : 2 * m]
-        prior, prior_weight = self.p[2 * m : 2 * m + n], self.p[2 * m + n :]
-        residual = weight * (curve.function(self.x) - data)
-        penalty = prior_weight * (self.x - prior)
+        data, self._weight = self.p[:m], self.p[m : 2 * m]
+        prior, self._prior_weight = self.p[2 * m : 2 * m + n], self.p[2 * m + n :]
+        self._residual = self._weight * (prediction.function(self.x) - data)
+        penalty = self._prior_weight * (self.x - prior)
 
-        rho = LOSSES[loss]
-        self.cost = 0.5 * casadi.sum1(rho(residual**2)) + 0.5 * casadi.sumsqr(penalty)
+        misfit = casadi.sum1(self._rho(self._residual**2))
+        self.cost = 0.5 * misfit + 0.5 * casadi.sumsqr(penalty)
         gradient = casadi.gradient(self.cost, self.x)
         arguments = [self.x, self.p]
         self.value_gradient = casadi.Function("cost", arguments, [self.cost, gradient])
 
-        z = casadi.MX.sym("z")
-        slope = casadi.Function("slope", [z], [casadi.gradient(rho(z), z)])
-        bend = casadi.sqrt(casadi.fmax(slope.map(m)((residual**2).T).T, 0.0))
-        jacobian = casadi.repmat(bend * weight, 1, n) * curve.jacobian(self.x)
-        self.gauss_newton = jacobian.T @ jacobian + casadi.diag(prior_weight**2)
+    @cached_property
+    def gauss_newton(self) -> "casadi.MX":
+        """J^T D J with D = rho'(r^2), the Hessian without the curvature of the model."""
+        import casadi
+
+        m, n = self._residual.numel(), self.x.numel()
+        z = casadi.MX.sym("z", m)
+        slope = casadi.gradient(casadi.sum1(self._rho(z)), z)
+        slope = casadi.substitute(slope, z, self._residual**2)
+        half = casadi.sqrt(casadi.fmax(slope, 0.0)) * self._weight
+        jacobian = casadi.repmat(half, 1, n) * self._prediction.jacobian(self.x)
+        return jacobian.T @ jacobian + casadi.diag(self._prior_weight**2)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Objective:
-    """A curve to be brought to data.
+    """A prediction to be brought to data.
 
     Parameters
     ----------
-    curve : Curve
+    prediction : Prediction
         Prediction of the m data from the n parameters.
     data, stderr : ndarray, shape (m,)
         Measured values and their standard errors, finite and stderr > 0.
     parameters : sequence of Parameter
-        In the order of the curve's argument.
+        In the order of the prediction's argument.
     loss : str
         A key of `LOSSES`.
     """
 
-    curve: Curve
+    prediction: Prediction
     data: np.ndarray
     stderr: np.ndarray
     parameters: Sequence[Parameter]
@@ -192,7 +211,7 @@ class Objective:
     @property
     def expressions(self) -> Expressions:
         """The symbolic cost, for solvers that want to differentiate it themselves."""
-        return self.curve.expressions(self.loss)
+        return self.prediction.expressions(self.loss)
 
     def cost(self, x: np.ndarray) -> float:
         """Return the cost at x; inf where the curve is not finite."""
@@ -206,7 +225,7 @@ class Objective:
 
     def predict(self, x: np.ndarray) -> np.ndarray:
         """Return the predicted curve at x, shape (m,)."""
-        return self.curve.function(x).full().ravel()
+        return self.prediction.function(x).full().ravel()
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """Return (prediction - data) / stderr at x, shape (m,), priors left out."""
@@ -214,7 +233,12 @@ class Objective:
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Return d residuals / dx at x, shape (m, n), priors left out."""
-        return self.curve.jacobian(x).full() / self.stderr[:, None]
+        return self.prediction.jacobian(x).full() / self.stderr[:, None]
+
+    def influence(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return psi = r rho'(r^2) of each residual at x and its derivative, each (m,)."""
+        psi, bend = _influence(self.loss)(self.residuals(x)[None, :])
+        return psi.full().ravel(), bend.full().ravel()
 
     def sizes(self, x: np.ndarray) -> np.ndarray:
         """Return the parameters' own size, or their natural scale where they are 0."""
@@ -232,9 +256,14 @@ class Objective:
         return np.where(np.isfinite(step) & (step > 0.0), step, self.sizes(x))
 
     def with_data(self, data: np.ndarray, stderr: np.ndarray) -> "Objective":
-        """Return the objective for other data or weights on the same curve."""
+        """Return the objective for other data or weights on the same prediction."""
         return replace(self, data=data, stderr=stderr)
 
     def with_parameters(self, parameters: Sequence[Parameter]) -> "Objective":
         """Return the objective with other starts or bounds."""
         return replace(self, parameters=tuple(parameters))
+
+    def started_at(self, x: np.ndarray) -> "Objective":
+        """Return the objective with another start, moved inside the bounds."""
+        pairs = zip(self.parameters, x, strict=True)
+        return self.with_parameters([p.started_at(float(value)) for p, value in pairs])

@@ -11,7 +11,7 @@ from pathlib import Path
 import casadi
 import numpy as np
 
-from fitting.objective import Curve, Objective
+from fitting.objective import Prediction, Objective
 from fitting.parameters import Parameter
 
 FOLDER = Path(__file__).parent / "nist_strd"
@@ -53,7 +53,7 @@ class CertifiedProblem:
             for i, value in enumerate(self.starts[start])
         ]
         return Objective(
-            curve=Curve(curve),
+            prediction=Prediction(curve),
             data=self.y,
             stderr=np.ones_like(self.y),
             parameters=parameters,

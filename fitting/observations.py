@@ -1,0 +1,243 @@
+"""A goniometer scan as a flat list of numbers to fit: what, where, how well.
+
+Every observable is a linear combination of Mueller elements seen by an instrument of ideal
+polarisers, except the degree of linear polarisation, a ratio of such combinations.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["ELEMENTS", "LINEAR", "Geometry", "Mask", "Observations", "observe"]
+
+ELEMENTS = tuple(f"M{out}{into}" for out in range(4) for into in range(4))
+
+# f_ab is the BRDF for a source polarised along b behind an analyser along a, I_a that of an
+# unpolarised source; each counts the light that leaves the analyser
+LINEAR: dict[str, dict[str, float]] = {
+    **{element: {element: 1.0} for element in ELEMENTS},
+    "I_s": {"M00": 0.5, "M10": 0.5},
+    "I_p": {"M00": 0.5, "M10": -0.5},
+    "f_ss": {"M00": 0.5, "M01": 0.5, "M10": 0.5, "M11": 0.5},
+    "f_sp": {"M00": 0.5, "M01": -0.5, "M10": 0.5, "M11": -0.5},
+    "f_ps": {"M00": 0.5, "M01": 0.5, "M10": -0.5, "M11": -0.5},
+    "f_pp": {"M00": 0.5, "M01": -0.5, "M10": -0.5, "M11": 0.5},
+}
+
+Mask = Callable[["xr.Dataset"], "np.ndarray | xr.Dataset"]
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """Directions of N measurements.
+
+    Parameters
+    ----------
+    theta_i, theta_s, dphi, phi_i : ndarray, shape (N,)
+        Angles of the conventions page. [rad]
+    wavelength : ndarray, shape (N,)
+        NaN where unknown. [um]
+    """
+
+    theta_i: np.ndarray
+    theta_s: np.ndarray
+    dphi: np.ndarray
+    phi_i: np.ndarray
+    wavelength: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Number of geometries."""
+        return len(self.theta_i)
+
+    @property
+    def theta_view(self) -> np.ndarray:
+        """Signed view angle, positive on the forward side; nan out of plane. [rad]"""
+        out = np.abs(np.sin(self.dphi)) * np.sin(self.theta_s) > 1e-9
+        return np.where(out, np.nan, -np.sign(np.cos(self.dphi)) * self.theta_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """The m numbers of one or several scans that enter a fit.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The N directions they were taken at.
+    scan : ndarray of int, shape (N,)
+        Which scan each direction belongs to.
+    labels : tuple of str
+        Names of the scans.
+    name : ndarray of str, shape (m,)
+        The observable.
+    at : ndarray of int, shape (m,)
+        Index into the geometry.
+    value, stderr : ndarray, shape (m,)
+        The number and its standard error, nan where the file gives none.
+    """
+
+    geometry: Geometry
+    scan: np.ndarray
+    labels: tuple[str, ...]
+    name: np.ndarray
+    at: np.ndarray
+    value: np.ndarray
+    stderr: np.ndarray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The observables that occur, in order of appearance."""
+        return tuple(dict.fromkeys(self.name.tolist()))
+
+    @property
+    def has_polarisation(self) -> bool:
+        """True if anything but M00 was measured."""
+        return set(self.names) != {"M00"}
+
+
+def observe(
+    scans: Mapping[str, "xr.Dataset"],
+    *,
+    use: Sequence[str] | None = None,
+    mask: Mask | Iterable[Mask] = (),
+) -> Observations:
+    """Flatten scans into the numbers to fit.
+
+    Parameters
+    ----------
+    scans : mapping of str to Dataset
+        Goniometer data sets, dimension `geometry`; NaN is not measured.
+    use : sequence of str, optional
+        Observables to use; default all that the scans hold.
+    mask : callable or iterable of callables
+        Each returns, for a scan, what to keep: a boolean array over `geometry`, or a Dataset
+        of them for single observables.
+
+    Raises
+    ------
+    TypeError
+        If a scan is not a Dataset.
+    ValueError
+        If nothing is left to fit, or a standard error is not positive.
+    """
+    masks = (mask,) if callable(mask) else tuple(mask)
+    parts = [
+        _flatten(label, scan, use, masks, index)
+        for index, (label, scan) in enumerate(scans.items())
+    ]
+    offsets = np.cumsum([0, *(part.geometry.size for part in parts)])
+    together = Observations(
+        geometry=Geometry(
+            *(
+                np.concatenate([getattr(part.geometry, angle) for part in parts])
+                for angle in ("theta_i", "theta_s", "dphi", "phi_i", "wavelength")
+            )
+        ),
+        scan=np.concatenate([part.scan for part in parts]),
+        labels=tuple(scans),
+        name=np.concatenate([part.name for part in parts]),
+        at=np.concatenate([part.at + o for part, o in zip(parts, offsets, strict=False)]),
+        value=np.concatenate([part.value for part in parts]),
+        stderr=np.concatenate([part.stderr for part in parts]),
+    )
+    if not len(together.value):
+        wanted = "M00..M33, DOLP, I_s, I_p or f_ss..f_pp" if use is None else ", ".join(use)
+        msg = f"measurement must hold numbers in {wanted}, got none. Check names and masks."
+        raise ValueError(msg)
+    return together
+
+
+def _flatten(
+    label: str,
+    scan: "xr.Dataset",
+    use: Sequence[str] | None,
+    masks: Sequence[Mask],
+    index: int,
+) -> Observations:
+    """Flatten one scan."""
+    geometry = _geometry(label, scan)
+    known = [*LINEAR, "DOLP"]
+    # DOLP follows from M00 and M10 where they are given: counting it too is using them twice
+    derived = {"DOLP"} if {"M00", "M10"} <= set(scan.data_vars) else set()
+    names = [name for name in known if name in scan and name not in derived]
+    if use is not None:
+        unknown = set(use) - set(known)
+        if unknown:
+            msg = f"use must name observables, got {sorted(unknown)[0]!r}. Known: {known}."
+            raise ValueError(msg)
+        names = [name for name in use if name in scan]
+    keep = [mask(scan) for mask in masks]
+    columns = []
+    for name in names:
+        value = np.asarray(scan[name].values, dtype=float)
+        good = np.isfinite(value)
+        for kept in keep:
+            if not hasattr(kept, "data_vars"):
+                good = good & np.asarray(kept, dtype=bool)
+            elif name in kept:
+                good = good & np.asarray(kept[name].values, dtype=bool)
+        columns.append((name, np.flatnonzero(good), value[good], _stderr(scan, name, good)))
+    return Observations(
+        geometry=geometry,
+        scan=np.full(geometry.size, index),
+        labels=(label,),
+        name=np.array([name for name, at, *_ in columns for _ in at], dtype=str),
+        at=np.concatenate([np.zeros(0, dtype=int), *(at for _, at, *_ in columns)]),
+        value=np.concatenate([np.zeros(0), *(value for _, _, value, _ in columns)]),
+        stderr=np.concatenate([np.zeros(0), *(stderr for *_, stderr in columns)]),
+    )
+
+
+def _stderr(scan: "xr.Dataset", name: str, good: np.ndarray) -> np.ndarray:
+    """Return the standard errors of the kept values, nan where there is no column."""
+    column = f"{name}_stderr"
+    if column not in scan:
+        return np.full(int(good.sum()), np.nan)
+    stderr = np.asarray(scan[column].values, dtype=float)[good]
+    wrong = ~(stderr > 0.0) & ~np.isnan(stderr)
+    if wrong.any():
+        where = np.flatnonzero(good)[wrong][0]
+        msg = (
+            f"{column} must be > 0, got {stderr[wrong][0]:g} at geometry {where}. "
+            "Leave it out to have the noise estimated."
+        )
+        raise ValueError(msg)
+    return stderr
+
+
+def _geometry(label: str, scan: "xr.Dataset") -> Geometry:
+    """Return the directions of a scan."""
+    if not hasattr(scan, "data_vars"):
+        msg = (
+            f"measurement must be an xarray.Dataset with the dimension geometry, got "
+            f"{type(scan).__name__} for {label}. Use data_io.read_goniometer."
+        )
+        raise TypeError(msg)
+    missing = [name for name in ("theta_i", "theta_s", "dphi") if name not in scan.coords]
+    if "geometry" not in scan.dims or missing:
+        lacks = ", ".join(missing) or "geometry"
+        msg = (
+            f"measurement {label} must have the dimension geometry with theta_i, theta_s and "
+            f"dphi [rad], got none of {lacks}. Use data_io.read_goniometer."
+        )
+        raise ValueError(msg)
+    size = scan.sizes["geometry"]
+
+    def column(name: str, default: float) -> np.ndarray:
+        if name not in scan.coords:
+            return np.full(size, default)
+        return np.broadcast_to(np.asarray(scan[name].values, dtype=float), (size,)).copy()
+
+    return Geometry(
+        theta_i=column("theta_i", np.nan),
+        theta_s=column("theta_s", np.nan),
+        dphi=column("dphi", np.nan),
+        phi_i=column("phi_i", 0.0),
+        wavelength=column("wavelength", np.nan),
+    )

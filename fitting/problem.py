@@ -1,0 +1,217 @@
+"""A fit put together from its parts, so that it can be solved again with changes.
+
+Profiles, comparisons and the study of what the data cannot tell all solve variants of one
+problem; this is the problem they share.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fitting.aperture import Aperture
+from fitting.casadi_solver import solve_casadi
+from fitting.forward import Layout, MuellerModel, predict
+from fitting.global_search import starts
+from fitting.nlopt_solver import solve_nlopt
+from fitting.noise import Weights
+from fitting.objective import Objective, Prediction
+from fitting.observations import Observations
+from fitting.parameters import Parameter
+from fitting.solution import Solution, better
+
+__all__ = ["SOLVERS", "Problem", "Solved", "covariance_rows"]
+
+SOLVERS: dict[str, Callable[[Objective], Solution]] = {
+    "casadi": solve_casadi,
+    "nlopt": solve_nlopt,
+}
+
+# Rounds of estimating the noise and fitting again
+_ROUNDS = 25
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A solution with the standard errors of the readings it was found under.
+
+    Parameters
+    ----------
+    solution : Solution
+        The minimum.
+    objective : Objective
+        The objective of the last round.
+    log_likelihood : float
+        Gaussian, at the minimum.
+    """
+
+    solution: Solution
+    objective: Objective
+    log_likelihood: float
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Model, data, layout and weights of one fit.
+
+    Parameters
+    ----------
+    model : MuellerModel
+        The model as the fit sees it.
+    observations : Observations
+        The readings.
+    layout : Layout
+        What is free.
+    parameters : tuple of Parameter
+        Starts, bounds and priors, in the order of the layout.
+    fixed : mapping of str to float
+        Values of other parameters in place of the model's.
+    weights : Weights
+        The standard errors of the readings.
+    loss, solver, search : str
+        Loss, solver and global search.
+    aperture : Aperture, optional
+        Cones of light.
+    seed : int
+        Seed of the global search.
+    objective : Objective
+        What the solver sees.
+    """
+
+    model: MuellerModel
+    observations: Observations
+    layout: Layout
+    parameters: tuple[Parameter, ...]
+    fixed: Mapping[str, float]
+    weights: Weights
+    loss: str
+    solver: str
+    search: str | None
+    aperture: Aperture | None
+    seed: int
+    objective: Objective
+
+    def predict(
+        self, observations: Observations | None = None, layout: Layout | None = None
+    ) -> Prediction:
+        """Return the prediction of other readings, or with other parameters free."""
+        return predict(
+            self.model,
+            self.observations if observations is None else observations,
+            self.layout if layout is None else layout,
+            fixed=self.fixed,
+            aperture=self.aperture,
+        )
+
+    def m00(self) -> Prediction:
+        """Return the prediction of M00 at the geometry of each reading."""
+        readings = self.observations
+        if (readings.name == "M00").all():
+            return self.objective.prediction
+        return self.predict(replace(readings, name=np.full(len(readings.name), "M00")))
+
+    def holding(self, name: str, value: float) -> "Problem":
+        """Return the problem with one parameter held at a value."""
+        held = tuple(
+            parameter.fixed_at(value) if parameter.name == name else parameter
+            for parameter in self.parameters
+        )
+        objective = self.objective.with_parameters(held)
+        return replace(self, parameters=held, objective=objective, search=None)
+
+    def solve(self, *, begin: np.ndarray | None = None) -> Solved:
+        """Fit, and where the noise is part of the question, fit and estimate it in turn.
+
+        Parameters
+        ----------
+        begin : ndarray, shape (n,), optional
+            A start in place of the parameters' own.
+        """
+        objective = self.objective
+        if begin is not None:
+            objective = objective.started_at(begin)
+        weights = self.weights
+        changes = weights.iterates or weights.n_estimated > 0
+        m00 = self.m00().function if weights.iterates else None
+        stderr = objective.stderr
+        search, count = self.search, 0
+        for _ in range(_ROUNDS if changes else 1):
+            solution = self._minimise(objective, search)
+            count += solution.n_evaluations
+            if not changes or not solution.converged:
+                break
+            previous, stderr = stderr, self._stderr(objective, solution, m00)
+            objective = objective.with_data(objective.data, stderr)
+            objective = objective.started_at(solution.x)
+            search = None
+            if np.allclose(stderr, previous, rtol=1e-7, atol=0.0):
+                break
+        solution = replace(solution, n_evaluations=count, cost=objective.cost(solution.x))
+        return Solved(solution, objective, _log_likelihood(objective, solution.x))
+
+    def _minimise(self, objective: Objective, search: str | None) -> Solution:
+        """Run the solver from each start and keep the lowest end."""
+        solve = SOLVERS[self.solver]
+        ends = [
+            solve(objective.started_at(start))
+            for start in starts(objective, search, seed=self.seed)
+        ]
+        best = ends[0]
+        for end in ends[1:]:
+            best = better(best, end)
+        return replace(best, n_evaluations=sum(end.n_evaluations for end in ends))
+
+    def _stderr(
+        self, objective: Objective, solution: Solution, m00: Callable | None
+    ) -> np.ndarray:
+        """Return the readings' standard errors under the curve just fitted."""
+        brightness = np.ones(len(objective.data))
+        if m00 is not None:
+            brightness = m00(solution.x).full().ravel()
+        shape = self.weights.shape(brightness)
+        # A reading where the model is dark still has some noise
+        shape = np.maximum(shape, 1e-6 * np.median(shape))
+        if self.weights.n_estimated == 0:
+            return shape
+        residual = objective.predict(solution.x) - objective.data
+        leverage = _leverage(objective, solution.x)
+        floor = 1e-12 * max(float(np.abs(objective.data).max()), 1e-300)
+        stderr = shape.copy()
+        for number in sorted(set(self.weights.group[self.weights.group >= 0].tolist())):
+            members = self.weights.group == number
+            scaled = residual[members] / shape[members]
+            freedom = max(float((1.0 - leverage[members]).sum()), 1e-9)
+            factor = _spread(scaled, freedom, robust=objective.loss != "linear")
+            stderr[members] = np.maximum(factor * shape[members], floor)
+        return stderr
+
+
+def _leverage(objective: Objective, x: np.ndarray) -> np.ndarray:
+    """Return how many parameters each reading pays for, shape (m,)."""
+    rows = covariance_rows(objective, x)
+    length = np.linalg.norm(rows, axis=0)
+    unit = rows / np.where(length > 0.0, length, 1.0)
+    left, singular, _ = np.linalg.svd(unit, full_matrices=False)
+    seen = singular > 1e-8 * max(singular[0], 1e-300)
+    return np.asarray((left[: len(objective.data), seen] ** 2).sum(axis=1))
+
+
+def _spread(scaled: np.ndarray, freedom: float, *, robust: bool) -> float:
+    """Return the noise factor of readings with `freedom` degrees of freedom."""
+    if robust:
+        # Median absolute deviation of a Gaussian is 0.6745 standard deviations
+        return float(np.median(np.abs(scaled)) / 0.6745 * np.sqrt(len(scaled) / freedom))
+    return float(np.sqrt((scaled**2).sum() / freedom))
+
+
+def _log_likelihood(objective: Objective, x: np.ndarray) -> float:
+    """Return the Gaussian log likelihood of the readings."""
+    residual = objective.residuals(x)
+    constant = np.log(objective.stderr * np.sqrt(2.0 * np.pi)).sum()
+    return float(-0.5 * (residual**2).sum() - constant)
+
+
+def covariance_rows(objective: Objective, x: np.ndarray) -> np.ndarray:
+    """Return the Jacobian with the rows that the priors add, shape (m + n, n)."""
+    prior = [1.0 / parameter.prior_stderr for parameter in objective.parameters]
+    return np.vstack([objective.jacobian(x), np.diag(prior)])

@@ -1,0 +1,175 @@
+"""Turn a solved problem into a result with uncertainties and warnings."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import stats
+
+from fitting.forward import INSTRUMENT, Layout
+from fitting.identifiability import identifiability_warnings, misfit_warnings
+from fitting.problem import Problem, Solved, covariance_rows
+from fitting.result import FitResult
+from fitting.uncertainty import (
+    Information,
+    correlation_matrix,
+    information,
+    sandwich,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["result_of"]
+
+
+def result_of(
+    problem: Problem, solved: Solved, uncertain: Mapping[str, float]
+) -> FitResult:
+    """Return the result of a solved problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was asked.
+    solved : Solved
+        What was found.
+    uncertain : mapping of str to float
+        Standard errors of parameters that were held fixed.
+    """
+    solution, objective = solved.solution, solved.objective
+    labels = problem.layout.labels
+    n, m = len(labels), len(objective.data)
+    residual = -objective.residuals(solution.x)
+    chi2, dof = float((residual**2).sum()), m - n
+
+    nothing = np.full((n, n), np.nan)
+    covariance, parts, warnings = nothing, {}, []
+    if not solution.converged:
+        warnings.append(f"no minimum was found ({solution.status}); do not use the values")
+    elif dof <= 0 and problem.weights.n_estimated:
+        warnings.append(
+            f"{m} readings cannot give {n} parameters and the noise; state the noise"
+        )
+    else:
+        found = information(covariance_rows(objective, solution.x))
+        if problem.loss != "linear":
+            found = _robust(objective, solution.x, found)
+        covariance, parts = _with_uncertain(problem, solved, found, uncertain)
+        p_value = np.nan
+        if problem.weights.n_estimated == 0 and dof > 0:
+            p_value = float(stats.chi2.sf(chi2, dof))
+        warnings += identifiability_warnings(problem, solved, found)
+        warnings += misfit_warnings(problem, solved, p_value)
+
+    values = dict(zip(labels, solution.x.tolist(), strict=True))
+    stderr = dict(zip(labels, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    models = _models(problem, solution.x)
+    return FitResult(
+        values=values,
+        stderr=stderr,
+        covariance=covariance,
+        correlation=correlation_matrix(covariance),
+        residuals=residual,
+        chi2=chi2,
+        dof=dof,
+        solver=solution.solver,
+        status=solution.status,
+        converged=solution.converged,
+        n_evaluations=solution.n_evaluations,
+        warnings=tuple(warnings),
+        model=next(iter(models.values())),
+        models=models,
+        noise=problem.weights.text,
+        log_likelihood=solved.log_likelihood,
+        n_estimated=problem.weights.n_estimated,
+        stderr_parts=parts,
+        readings=_readings(problem, solved),
+        problem=replace(problem, objective=objective),
+    )
+
+
+def _robust(objective: object, x: np.ndarray, found: Information) -> Information:
+    """Return the information with the covariance of the robust estimate."""
+    slope, bend = objective.influence(x)  # type: ignore[attr-defined]
+    covariance = sandwich(objective.jacobian(x), slope, bend, found)  # type: ignore[attr-defined]
+    return replace(found, covariance=covariance)
+
+
+def _with_uncertain(
+    problem: Problem, solved: Solved, found: Information, uncertain: Mapping[str, float]
+) -> tuple[np.ndarray, dict[str, dict[str, float]]]:
+    """Add the uncertainty of fixed parameters to the covariance, and keep account of it.
+
+    With free parameters x and a fixed one b the minimum moves by
+    dx/db = -(J^T J)^-1 J^T (dr/db), so b's variance adds (dx/db) var(b) (dx/db)^T.
+    """
+    labels = problem.layout.labels
+    covariance = found.covariance.copy()
+    parts = {name: {"noise": float(found.stderr[i])} for i, name in enumerate(labels)}
+    if not uncertain:
+        return covariance, parts
+    x, objective = solved.solution.x, solved.objective
+    n = len(labels)
+    column = {
+        name: np.full(problem.observations.geometry.size, n + i)
+        for i, name in enumerate(uncertain)
+    }
+    wider = Layout(
+        labels=(*labels, *uncertain),
+        base=(*problem.layout.base, *uncertain),
+        column={**problem.layout.column, **column},
+    )
+    everything = np.concatenate([x, [problem.fixed[name] for name in uncertain]])
+    jacobian = problem.predict(layout=wider).jacobian(everything).full()
+    jacobian = jacobian / objective.stderr[:, None]
+    normal = np.nan_to_num(found.covariance, posinf=0.0)
+    for i, (name, stderr) in enumerate(uncertain.items()):
+        moved = -normal @ (jacobian[:, :n].T @ jacobian[:, n + i]) * stderr
+        covariance += np.outer(moved, moved)
+        for label, shift in zip(labels, moved, strict=True):
+            parts[label][name] = float(abs(shift))
+    return covariance, parts
+
+
+def _models(problem: Problem, x: np.ndarray) -> dict[str, object]:
+    """Return the user's model with the fitted values, for each scan."""
+    models = {}
+    for index, label in enumerate(problem.observations.labels):
+        here = np.flatnonzero(problem.observations.scan == index)
+        values = dict(problem.fixed)
+        for name, column in problem.layout.column.items():
+            values[name] = float(x[column[here[0]]])
+        brdf = {name: value for name, value in values.items() if name not in INSTRUMENT}
+        models[label] = problem.model.updated(brdf)
+    return models
+
+
+def _readings(problem: Problem, solved: Solved) -> "xr.Dataset":
+    """Return every reading beside its fitted value, dimension `reading`."""
+    import xarray as xr
+
+    observations, objective = problem.observations, solved.objective
+    geometry, at = observations.geometry, observations.at
+    predicted = objective.predict(solved.solution.x)
+    labels = np.array(observations.labels)
+    columns = {
+        "measured": objective.data,
+        "model": predicted,
+        "stderr": objective.stderr,
+        "residual": (objective.data - predicted) / objective.stderr,
+    }
+    coords = {
+        "observable": observations.name,
+        "scan": labels[observations.scan[at]],
+        "theta_i": geometry.theta_i[at],
+        "theta_s": geometry.theta_s[at],
+        "dphi": geometry.dphi[at],
+        "theta_view": geometry.theta_view[at],
+        "wavelength": geometry.wavelength[at],
+    }
+    return xr.Dataset(
+        {name: ("reading", value) for name, value in columns.items()},
+        coords={name: ("reading", value) for name, value in coords.items()},
+    )

@@ -1,0 +1,185 @@
+"""What a fit found, how well, and what it could not find."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import stats
+
+from fitting.estimate import Estimate
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from fitting.problem import Problem
+
+__all__ = ["FitResult"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FitResult:
+    """Parameters with their uncertainty, and the misfit that is left.
+
+    Parameters
+    ----------
+    values, stderr : mapping of str to float
+        Best values and standard errors by parameter name; a parameter that is separate for
+        each scan appears as `name[scan]`. The standard error is inf where the data do not
+        determine the parameter and nan where there is no minimum.
+    covariance, correlation : ndarray, shape (n, n)
+        In the order of `values`, uncertainty of fixed parameters included.
+    residuals : ndarray, shape (m,)
+        (measured - model) / standard error; their squares sum to `chi2`.
+    chi2 : float
+        Sum of squared residuals. Where the noise is estimated it equals `dof` by
+        construction and says nothing about the fit.
+    dof : int
+        Readings minus free parameters.
+    solver, status : str
+        Who stopped, and why.
+    converged : bool
+        True if `status` is a minimum.
+    n_evaluations : int
+        How often the cost was computed.
+    warnings : tuple of str
+        What a reader must know before using a number.
+    model : object
+        The model with the fitted values: where a parameter is separate, those of the first
+        group.
+    models : mapping of str to object
+        The model of each scan.
+    noise : str
+        Where the standard errors of the readings come from.
+    log_likelihood : float
+        Gaussian, at the minimum.
+    n_estimated : int
+        Parameters of the noise that were estimated beside the free ones.
+    stderr_parts : mapping of str to mapping
+        Standard error of each parameter by source: "noise" and each uncertain fixed
+        parameter.
+    readings : Dataset
+        Measured, model, stderr and residual of every reading, with its geometry.
+    """
+
+    values: Mapping[str, float]
+    stderr: Mapping[str, float]
+    covariance: np.ndarray
+    correlation: np.ndarray
+    residuals: np.ndarray
+    chi2: float
+    dof: int
+    solver: str
+    status: str
+    converged: bool
+    n_evaluations: int
+    warnings: tuple[str, ...]
+    model: Any
+    models: Mapping[str, Any]
+    noise: str
+    log_likelihood: float
+    n_estimated: int
+    stderr_parts: Mapping[str, Mapping[str, float]]
+    readings: "xr.Dataset"
+    problem: "Problem" = field(repr=False)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The free parameters, in the order of the matrices."""
+        return tuple(self.values)
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """Each parameter as value, standard error and symmetric 95 % interval.
+
+        Cut at the bounds. `profile` gives intervals that may be lopsided or open.
+        """
+        found = {}
+        for parameter in self.problem.objective.parameters:
+            value, stderr = self.values[parameter.name], self.stderr[parameter.name]
+            half = self.quantile(0.95) * stderr
+            low, high = max(value - half, parameter.low), min(value + half, parameter.high)
+            found[parameter.name] = Estimate(value, stderr, low, high)
+        return found
+
+    def quantile(self, level: float) -> float:
+        """Return the half width of a `level` interval in standard errors.
+
+        Student's t where the noise was estimated, else the normal distribution.
+        """
+        tail = 0.5 + level / 2.0
+        if self.n_estimated and self.dof > 0:
+            return float(stats.t.ppf(tail, self.dof))
+        return float(stats.norm.ppf(tail))
+
+    @property
+    def p_value(self) -> float:
+        """Chance of a chi2 this high if the model is right; nan where it was made to fit."""
+        if self.n_estimated or self.dof <= 0:
+            return np.nan
+        return float(stats.chi2.sf(self.chi2, self.dof))
+
+    @property
+    def aic(self) -> float:
+        """Akaike's information criterion with the correction for few readings."""
+        k, m = len(self.values) + self.n_estimated, len(self.residuals)
+        correction = 2.0 * k * (k + 1) / (m - k - 1) if m > k + 1 else np.inf
+        return 2.0 * k - 2.0 * self.log_likelihood + correction
+
+    @property
+    def bic(self) -> float:
+        """Schwarz's information criterion."""
+        k, m = len(self.values) + self.n_estimated, len(self.residuals)
+        return k * np.log(m) - 2.0 * self.log_likelihood
+
+    def summary(self) -> str:
+        """Return the result as a few lines of text."""
+        width = max(len(name) for name in self.values)
+        lines = [f"{self.status} ({self.solver}, {self.n_evaluations} evaluations)"]
+        for name, value in self.values.items():
+            lines.append(f"  {name:<{width}} = {_pair(value, self.stderr[name])}")
+        quality = "made to fit" if self.n_estimated else f"p = {self.p_value:.2g}"
+        lines.append(f"  chi2 / dof = {self.chi2:.4g} / {self.dof} ({quality})")
+        lines.append(f"  noise: {self.noise}")
+        lines += [f"  warning: {warning}" for warning in self.warnings]
+        return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the numbers for a JSON file; nan and inf become null."""
+        matrix = self.correlation.tolist()
+        return {
+            "status": self.status,
+            "converged": self.converged,
+            "solver": self.solver,
+            "n_evaluations": self.n_evaluations,
+            "parameters": {
+                name: {key: _number(value) for key, value in estimate.as_dict().items()}
+                for name, estimate in self.estimates.items()
+            },
+            "stderr_parts": {
+                name: {source: _number(part) for source, part in parts.items()}
+                for name, parts in self.stderr_parts.items()
+            },
+            "correlation": [[_number(entry) for entry in row] for row in matrix],
+            "chi2": _number(self.chi2),
+            "dof": self.dof,
+            "p_value": _number(self.p_value),
+            "aic": _number(self.aic),
+            "bic": _number(self.bic),
+            "noise": self.noise,
+            "warnings": list(self.warnings),
+        }
+
+
+def _pair(value: float, stderr: float) -> str:
+    """Write value and standard error to two digits of the latter."""
+    if np.isinf(stderr):
+        return f"{value:.4g} (not determined)"
+    if not np.isfinite(stderr) or stderr <= 0.0:
+        return f"{value:.6g}"
+    decimals = int(np.clip(1 - np.floor(np.log10(stderr)), 0, 12))
+    return f"{value:.{decimals}f} ± {stderr:.{decimals}f}"
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
