@@ -2,15 +2,30 @@
 
 from data_io.goniometer import in_plane, read_goniometer, view_angle, write_goniometer
 from data_io.heightmap import read_height_map
+from data_io.micrograph import (
+    EdgeProfile,
+    MicrographWarning,
+    read_profile_image,
+    read_profile_images,
+    write_profile_overlay,
+)
 from data_io.profile import MissingUnitWarning, Profile, read_profile
+from data_io.results import read_result, write_result
 
 __all__ = [
+    "EdgeProfile",
+    "MicrographWarning",
     "MissingUnitWarning",
     "Profile",
     "in_plane",
     "read_goniometer",
     "read_height_map",
     "read_profile",
+    "read_profile_image",
+    "read_profile_images",
+    "read_result",
     "view_angle",
     "write_goniometer",
+    "write_profile_overlay",
+    "write_result",
 ]

@@ -84,7 +84,12 @@ class Camera:
 
 
 def gaussian_edge(
-    rng: np.random.Generator, length: float, spacing: float, *, height_rms: float, corr_length: float
+    rng: np.random.Generator,
+    length: float,
+    spacing: float,
+    *,
+    height_rms: float,
+    corr_length: float,
 ) -> Edge:
     """Draw an edge with Gaussian heights and autocorrelation h^2 exp(-r^2 / l^2).
 
@@ -149,7 +154,11 @@ def _add_dust(level: np.ndarray, camera: Camera, rng: np.random.Generator) -> np
     level = level.copy()
     rows, columns = level.shape
     for _ in range(rng.poisson(camera.dust * level.size / 1e6)):
-        row, column, radius = rng.uniform(0, rows), rng.uniform(0, columns), rng.uniform(1, 5)
+        row, column, radius = (
+            rng.uniform(0, rows),
+            rng.uniform(0, columns),
+            rng.uniform(1, 5),
+        )
         top, left = max(int(row) - 12, 0), max(int(column) - 12, 0)
         patch = level[top : top + 25, left : left + 25]
         r, c = np.mgrid[top : top + patch.shape[0], left : left + patch.shape[1]]
@@ -182,7 +191,9 @@ def make_micrograph(path: str | Path, seed: int, camera: Camera | None = None) -
     rng = np.random.default_rng(seed)
     length = N_CORR_LENGTHS * CORR_LENGTH
     spacing = camera.um_per_pixel / 8
-    edge = gaussian_edge(rng, length, spacing, height_rms=HEIGHT_RMS, corr_length=CORR_LENGTH)
+    edge = gaussian_edge(
+        rng, length, spacing, height_rms=HEIGHT_RMS, corr_length=CORR_LENGTH
+    )
     imsave(path, photograph(edge, camera, rng), check_contrast=False)
     return edge
 

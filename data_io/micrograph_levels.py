@@ -1,0 +1,238 @@
+"""From an image file to flattened intensities: 0 in the dark phase, 1 in the bright one."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+
+from pbrdf.errors import DataFileError
+
+# Smallest picture that can hold an edge worth statistics. [pixels]
+MIN_COLUMNS, MIN_ROWS = 32, 16
+
+
+@dataclass(frozen=True, kw_only=True)
+class Levels:
+    """A flattened picture of two phases.
+
+    Parameters
+    ----------
+    phase : ndarray, shape (rows, columns)
+        0 at the local dark level, 1 at the local bright level.
+    threshold : float
+        Mean grey level midway between the two, where the edge is. [fraction of white]
+    contrast : float
+        Mean difference of the two levels. [fraction of white]
+    unevenness : float
+        Largest over smallest local contrast, less one. [1]
+    noise : float
+        Standard deviation of the grain over the contrast, robustly. [1]
+    explained : float
+        Part of the variance of the smoothed picture that the two levels explain. [1]
+    """
+
+    phase: np.ndarray
+    threshold: float
+    contrast: float
+    unevenness: float
+    noise: float
+    explained: float
+
+
+def load_grey(path: str | Path) -> tuple[np.ndarray, str]:
+    """Read an image file; return grey levels in [0, 1] and the name of the channel used.
+
+    Of a colour picture the channel (grey, red, green or blue) is taken whose histogram falls
+    most clearly into two classes.
+    """
+    from skimage import color, util
+
+    image = _decode(Path(path))
+    if image.dtype.kind == "f":
+        low, high = float(image.min()), float(image.max())
+        image = (image - low) / (high - low) if high > low else np.zeros_like(image)
+    image = util.img_as_float64(image)
+    if image.ndim == 2:
+        return image, "grey"
+    if image.shape[-1] == 4:
+        image = color.rgba2rgb(image)
+    channels = {
+        "grey": color.rgb2gray(image),
+        "red": image[..., 0],
+        "green": image[..., 1],
+        "blue": image[..., 2],
+    }
+    # Grey has less noise than one channel: it wins a near draw
+    score = {name: _separability(channel) for name, channel in channels.items()}
+    score["grey"] += 0.02
+    best = max(score, key=lambda name: score[name])
+    return channels[best], best
+
+
+def _decode(path: Path) -> np.ndarray:
+    """Return the samples of a single picture that is large enough."""
+    from skimage import io
+
+    if not path.is_file():
+        raise DataFileError(path, "expected an image file, found none", "Check the path.")
+    try:
+        image = np.asarray(io.imread(path))
+    except Exception as error:  # each decoder behind imread has its own family of errors
+        problem = (
+            "expected a picture (PNG, TIFF, JPEG, BMP), got a file that none can decode"
+        )
+        raise DataFileError(path, problem, "Check the file or save it as PNG.") from error
+    if image.ndim == 3 and image.shape[-1] == 2:
+        image = image[..., 0]  # grey with transparency
+    if image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[-1] not in (3, 4)):
+        problem = (
+            f"expected one grey or colour picture, got an array of shape {image.shape}"
+        )
+        raise DataFileError(path, problem, "Save a single frame.")
+    rows, columns = image.shape[:2]
+    if min(rows, columns) < MIN_ROWS or max(rows, columns) < MIN_COLUMNS:
+        problem = (
+            f"expected at least {MIN_COLUMNS} x {MIN_ROWS} pixels, got {columns} x {rows}"
+        )
+        raise DataFileError(path, problem, "Use the original picture, not a thumbnail.")
+    if image.dtype.kind == "f" and not np.isfinite(image).all():
+        problem = "expected finite grey levels, got NaN or infinity"
+        raise DataFileError(path, problem, "Fill or cut the missing pixels.")
+    return image
+
+
+def _separability(channel: np.ndarray) -> float:
+    """Return Otsu's part of the variance between the two classes of a histogram."""
+    from skimage.filters import threshold_otsu
+
+    step = max(1, min(channel.shape) // 512)
+    sample = channel[::step, ::step]
+    if np.ptp(sample) == 0:
+        return 0.0
+    upper = sample > threshold_otsu(sample)
+    share = upper.mean()
+    gap = sample[upper].mean() - sample[~upper].mean()
+    return float(share * (1 - share) * gap**2 / sample.var())
+
+
+def find_annotation_band(grey: np.ndarray) -> tuple[int, int]:
+    """Return (first, last) row of the picture without a text band at top or bottom.
+
+    Electron microscopes add a band of uniform ground with text. Its border is straight to the
+    pixel, and it holds writing of high contrast; a silhouette has neither.
+    """
+    rows = grey.shape[0]
+    for flipped in (False, True):
+        image = grey[::-1] if flipped else grey
+        ground = np.median(image[-1])
+        share = np.mean(np.abs(image - ground) < 0.05, axis=1)
+        in_band = share > 0.3
+        height = int(np.argmin(in_band[::-1])) if not in_band.all() else rows
+        if not 0.01 * rows < height < 0.25 * rows:
+            continue
+        writing = np.mean(np.abs(image[rows - height :] - ground) > 0.3)
+        if (
+            writing > 0.002
+            and share[rows - height] > 0.9
+            and share[rows - height - 1] < 0.1
+        ):
+            return (height, rows) if flipped else (0, rows - height)
+    return 0, rows
+
+
+def flatten(grey: np.ndarray) -> Levels | None:
+    """Fit smooth dark and bright levels to a picture of two phases and scale by them.
+
+    Both levels are quadratic polynomials of the position, fitted to the pixels of their class
+    away from the border; classes and levels are found in turn, as by Ridler and Calvard, from
+    a threshold of the whole picture and from one for each strip of columns, and the better
+    result is kept. Returns None for a picture without contrast.
+
+    References
+    ----------
+    .. [1] T. W. Ridler, S. Calvard, Picture thresholding using an iterative selection method,
+       IEEE Trans. Syst. Man Cybern. 8 (1978) 630.
+    """
+    from skimage.filters import threshold_otsu
+
+    smooth = ndimage.gaussian_filter(grey, 2.0)
+    if np.ptp(smooth) < 1e-6:
+        return None
+    starts = [np.full(grey.shape, threshold_otsu(smooth)), _strip_thresholds(smooth)]
+    fits = [
+        fit for start in starts if (fit := _fit_levels(grey, smooth, start)) is not None
+    ]
+    if not fits:
+        return None
+    dark, bright, explained = max(fits, key=lambda fit: fit[2])
+    contrast = bright - dark
+    phase = (grey - dark) / contrast
+    # Differences of neighbours hold the grain alone; their median absolute value ignores edges
+    noise = np.median(np.abs(np.diff(phase[::2], axis=1))) / (0.6745 * np.sqrt(2))
+    return Levels(
+        phase=phase,
+        threshold=float(np.mean((bright + dark) / 2)),
+        contrast=float(contrast.mean()),
+        unevenness=float(contrast.max() / contrast.min() - 1),
+        noise=float(noise),
+        explained=explained,
+    )
+
+
+def _strip_thresholds(smooth: np.ndarray) -> np.ndarray:
+    """Threshold of each strip of columns, interpolated between their centres."""
+    from skimage.filters import threshold_otsu
+
+    columns = smooth.shape[1]
+    edges = np.linspace(0, columns, 13).astype(int)
+    centres = (edges[1:] + edges[:-1]) / 2
+    values = [threshold_otsu(smooth[:, a:b]) for a, b in pairwise(edges)]
+    return np.broadcast_to(np.interp(np.arange(columns), centres, values), smooth.shape)
+
+
+def _fit_levels(
+    grey: np.ndarray, smooth: np.ndarray, threshold: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float] | None:
+    """Return dark level, bright level and explained variance from a first threshold."""
+    rows, columns = grey.shape
+    step = max(1, int(np.sqrt(grey.size / 60_000)))
+    sample = np.s_[step // 2 :: step, step // 2 :: step]
+    v, u = np.mgrid[-1 : 1 : rows * 1j, -1 : 1 : columns * 1j]
+    basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=-1)
+    dark = bright = np.zeros_like(grey)
+    previous = None
+    for _ in range(12):
+        mask = smooth > threshold
+        # Pixels near the border are a mixture of both classes
+        inside = ndimage.gaussian_filter(mask.astype(np.float32), 3.0, truncate=2.0)[sample]
+        classes = [inside < 0.02, inside > 0.98]
+        if min(np.count_nonzero(c) for c in classes) < 30:
+            return None
+        dark, bright = (
+            basis @ _robust_fit(basis[sample][c], grey[sample][c]) for c in classes
+        )
+        if (bright - dark).min() < 0.1 * (bright - dark).mean() or (bright <= dark).any():
+            return None
+        threshold = (dark + bright) / 2
+        if previous is not None and np.mean(mask != previous) < 1e-5:
+            break
+        previous = mask
+    model = np.where(smooth > threshold, bright, dark)
+    explained = 1 - np.mean((smooth - model)[sample] ** 2) / np.var(smooth[sample])
+    return dark, bright, float(explained)
+
+
+def _robust_fit(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Least squares that leaves out what lies beyond four robust standard deviations."""
+    keep = np.ones(values.size, dtype=bool)
+    coefficients = np.zeros(basis.shape[1])
+    for _ in range(3):
+        coefficients = np.linalg.lstsq(basis[keep], values[keep], rcond=None)[0]
+        residual = values - basis @ coefficients
+        spread = 1.4826 * np.median(np.abs(residual[keep] - np.median(residual[keep])))
+        keep = np.abs(residual) <= 4 * spread + 1e-9
+        if np.count_nonzero(keep) < 2 * basis.shape[1]:
+            break
+    return coefficients
