@@ -111,7 +111,7 @@ def _angle(long_name: str) -> dict[str, str]:
 
 
 def _units(name: str) -> str:
-    return "1" if name.startswith("DOLP") else "sr^-1"
+    return "1" if name.startswith("DOLP") else "sr-1"
 
 
 def _check_angles(scan: Scan) -> None:

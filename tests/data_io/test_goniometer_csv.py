@@ -114,7 +114,7 @@ def test_units_gaps_comments_and_order_of_columns(tmp_path):
     assert_allclose(scan.dphi, np.radians(270))
     assert_array_equal(scan.DOLP, [0.25, np.nan])
     assert_array_equal(scan.M31, [np.nan, -0.001])
-    assert scan.M31.attrs["units"] == "sr^-1"
+    assert scan.M31.attrs["units"] == "sr-1"
     assert scan.DOLP.attrs["units"] == "1"
 
 
