@@ -9,6 +9,7 @@ from data_io.micrograph import (
     read_profile_images,
     write_profile_overlay,
 )
+from data_io.model import read_model, write_model
 from data_io.profile import MissingUnitWarning, Profile, read_profile
 from data_io.results import read_result, write_result
 
@@ -20,12 +21,14 @@ __all__ = [
     "in_plane",
     "read_goniometer",
     "read_height_map",
+    "read_model",
     "read_profile",
     "read_profile_image",
     "read_profile_images",
     "read_result",
     "view_angle",
     "write_goniometer",
+    "write_model",
     "write_profile_overlay",
     "write_result",
 ]
