@@ -39,8 +39,8 @@ Facet = namedtuple("Facet", "slope_x slope_y tan2_tilt cos_beta sin2_beta")
 
 
 @jit
-def directions(theta_i, theta_s, dphi, phi_i):
-    """Sines and cosines of the zeniths, d = (theta_i - theta_s)/2, h = dphi/2 and phi_i."""
+def directions(theta_i, theta_s, dphi, cos_phi, sin_phi):
+    """Sines and cosines of the zeniths, d = (theta_i - theta_s)/2 and h = dphi/2."""
     sin_d = sin(0.5 * (theta_i - theta_s))
     return Directions(
         cos(theta_i),
@@ -51,8 +51,8 @@ def directions(theta_i, theta_s, dphi, phi_i):
         sqrt(1.0 - sin_d * sin_d),
         sin(0.5 * dphi),
         cos(0.5 * dphi),
-        cos(phi_i),
-        sin(phi_i),
+        cos_phi,
+        sin_phi,
     )
 
 
@@ -152,7 +152,7 @@ def write_rotation(cos_2a, sin_2a, out):
 def fill_rotations(theta_i, theta_s, dphi, turn_i, turn_s):
     """Fill R(alpha_i) and R(alpha_s), from the meridian frames into that of the facet."""
     for k in range(theta_i.size):
-        way = directions(theta_i[k], theta_s[k], dphi[k], 0.0)
+        way = directions(theta_i[k], theta_s[k], dphi[k], 1.0, 0.0)
         cos_2i, sin_2i, cos_2s, sin_2s = frame_rotations(way)
         write_rotation(cos_2i, sin_2i, turn_i[k])
         write_rotation(cos_2s, sin_2s, turn_s[k])

@@ -20,6 +20,7 @@ from pbrdf.kernels import jit
 ESCAPED, HIT, SIDE, LOST = 0, 1, 2, 3
 FACET_LOW, FACET_HIGH = 0, 1  # the facet with u > v, and the one with u < v
 UNKNOWN = -1.0  # a clearance that was not followed
+NEVER = 1e300  # time per cell of a ray that does not move along an axis
 START_LEVEL = 3  # blocks of 8 cells: where a ray from above starts to look
 
 
@@ -110,8 +111,10 @@ def walk(
     # The ray in the plane is x0 + speed_x t; x0 moves back by a period at each wrap
     x0 = i + u
     y0 = j + v
-    forward_x = speed_x > 0.0
-    forward_y = speed_y > 0.0
+    forward_x = speed_x >= 0.0
+    forward_y = speed_y >= 0.0
+    per_x = 1.0 / speed_x if speed_x != 0.0 else NEVER
+    per_y = 1.0 / speed_y if speed_y != 0.0 else NEVER
     rising = speed_z >= 0.0
     t = 0.0
     clear = UNKNOWN
@@ -128,12 +131,8 @@ def walk(
         low_y = (j >> level) << level
         high_x = min(low_x + (1 << level), nx)
         high_y = min(low_y + (1 << level), ny)
-        t_x = math.inf
-        t_y = math.inf
-        if speed_x != 0.0:
-            t_x = ((high_x if forward_x else low_x) - x0) / speed_x
-        if speed_y != 0.0:
-            t_y = ((high_y if forward_y else low_y) - y0) / speed_y
+        t_x = ((high_x if forward_x else low_x) - x0) * per_x
+        t_y = ((high_y if forward_y else low_y) - y0) * per_y
         t_out = max(min(t_x, t_y), t)
         z_out = z + speed_z * t_out
         lowest = z_in if rising else z_out

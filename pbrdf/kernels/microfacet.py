@@ -1,7 +1,7 @@
 """The Mueller BRDF of a rough surface made of Fresnel facets, equation (20)."""
 
 from collections import namedtuple
-from math import pi
+from math import cos, pi, sin
 
 from . import jit
 from .facet import directions, mirror_facet, rotated_elements
@@ -50,8 +50,11 @@ def fill_brdf(theta_i, theta_s, dphi, phi_i, n, kappa, surface, out):
     """Fill out[k] with the matrix of geometry k; arrays of length 1 hold for all."""
     each_phi = 1 if phi_i.size > 1 else 0
     each_index = 1 if n.size > 1 else 0
+    cos_phi, sin_phi = cos(phi_i[0]), sin(phi_i[0])
     for k in range(theta_i.size):
-        way = directions(theta_i[k], theta_s[k], dphi[k], phi_i[k * each_phi])
+        if each_phi:
+            cos_phi, sin_phi = cos(phi_i[k]), sin(phi_i[k])
+        way = directions(theta_i[k], theta_s[k], dphi[k], cos_phi, sin_phi)
         m = k * each_index
         rows = microfacet_brdf(way, n[m], kappa[m], surface)
         for i in range(4):

@@ -28,8 +28,9 @@ __all__ = [
 
 GAUSSIAN, MODIFIED_GAUSSIAN, MODIFIED_CAUCHY, EXPONENTIAL, TROWBRIDGE_REITZ = range(5)
 
-# law: one of the above; slope_x, slope_y: per-axis scale; norm: from `slope_norm`
-Roughness = namedtuple("Roughness", "law slope_x slope_y norm")
+# law: one of the above; slope_x, slope_y: per-axis scale; isotropic: whether known equal;
+# norm: from `slope_norm`
+Roughness = namedtuple("Roughness", "law slope_x slope_y isotropic norm")
 
 SQRT_3 = sqrt(3.0)
 SQRT_PI = sqrt(pi)
@@ -96,6 +97,8 @@ def radial_density(rough, r2):
 @jit
 def slope_density(rough, facet):
     """Probability density of the facet's slopes, per unit slope area."""
+    if rough.isotropic:
+        return radial_density(rough, facet.tan2_tilt)
     stretch = rough.slope_y / rough.slope_x
     r2 = facet.slope_x * facet.slope_x * stretch + facet.slope_y * facet.slope_y / stretch
     return radial_density(rough, r2)
@@ -104,6 +107,8 @@ def slope_density(rough, facet):
 @jit
 def slope_along(rough, cos_phi, sin_phi):
     """Scale of the slopes along an azimuth."""
+    if rough.isotropic:
+        return rough.slope_x
     x = rough.slope_x * cos_phi
     y = rough.slope_y * sin_phi
     return sqrt(x * x + y * y)
@@ -123,17 +128,17 @@ def overhang_integral(rough, cot):
     return 2.0 * total / cot
 
 
-@jit
+@jit(forceinline=True)
 def mean_overhang(rough, cos_theta, sin_theta, slope):
     """Smith's Lambda = <max(z' - cot theta, 0)> / cot theta for slopes z' along the ray.
 
     Closed forms: B. Smith, IEEE Trans. Antennas Propag. 15, 668 (1967), Gaussian; B. Walter
     et al., Microfacet models for refraction (2007), Trowbridge-Reitz.
     """
-    cot = cos_theta / (sin_theta + 1e-30)
     if rough.law == GAUSSIAN:
-        nu = cot / (sqrt(2.0) * slope)
+        nu = cos_theta / (sqrt(2.0) * slope * sin_theta + 1e-30)
         return 0.5 * (exp(-nu * nu) / (nu * SQRT_PI) + erf(nu) - 1.0)
+    cot = cos_theta / (sin_theta + 1e-30)
     if rough.law == TROWBRIDGE_REITZ:
         x = 2.0 * slope * slope / (cot * cot)
         # sqrt(1 + x) - 1 without its cancellation

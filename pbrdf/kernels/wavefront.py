@@ -11,7 +11,8 @@ import math
 from pbrdf.kernels import jit
 from pbrdf.kernels.heightfield import facet_gradient
 from pbrdf.kernels.shading import N_ESCAPED, N_LEAKED, N_SELF, N_SIDE, N_TRUNCATED, tally_path
-from pbrdf.kernels.transport import azimuth, bounce, entry_point, exit_turn
+from pbrdf.kernels.entry import entry_line, first_ray, wrap_into
+from pbrdf.kernels.transport import bounce, exit_turn
 
 # Columns of a ray's state: place in cell, height, direction, s axis, azimuth of the source
 U, V, Z, KX, KY, KZ, SX, SY, SZ, COS_PHI, SIN_PHI, N_STATE = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
@@ -21,22 +22,34 @@ CELL_I, CELL_J, FACET, FACE, BOUNCES, N_CELL = 0, 1, 2, 3, 4, 5
 
 @jit
 def enter_rays(
-    first, n_rays, launch, shifts, sin_theta_i, cos_theta_i, phi_i, uniform_phi, z_top, nx, ny,
-    state, cell, active,
+    first, n_rays, launch, n_lines, shifts, pitch_x, pitch_y,
+    sin_theta_i, cos_theta_i, phi_i, uniform_phi, z_top, nx, ny, state, cell, active,
 ):  # fmt: skip
     """Put rays `first`, first + 1 ... of a batch at their entry points in the top plane."""
+    line = -1
+    start = 0
+    end = 0
     for k in range(active.shape[0]):
-        ray = first + k
-        x, y = entry_point(ray, n_rays, launch, shifts)
-        phi = azimuth(ray, phi_i, uniform_phi, shifts)
+        if first + k >= end:
+            line = ((first + k) * n_lines) // n_rays
+            start = first_ray(line, n_lines, n_rays)
+            end = first_ray(line + 1, n_lines, n_rays)
+            start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = (
+                entry_line(
+                    line, n_lines, launch, shifts, phi_i, uniform_phi, pitch_x, pitch_y
+                )
+            )
+        s = length * ((first + k - start + offset) / (end - start))
+        x = wrap_into(start_x + speed_x * s, launch[0], launch[2])
+        y = wrap_into(start_y + speed_y * s, launch[1], launch[3])
         i = min(int(x), nx - 1)
         j = min(int(y), ny - 1)
         place = state[k]
         place[U] = x - i
         place[V] = y - j
         place[Z] = z_top
-        place[COS_PHI] = math.cos(phi)
-        place[SIN_PHI] = math.sin(phi)
+        place[COS_PHI] = cos_phi
+        place[SIN_PHI] = sin_phi
         place[KX] = -sin_theta_i * place[COS_PHI]
         place[KY] = -sin_theta_i * place[SIN_PHI]
         place[KZ] = -cos_theta_i

@@ -49,6 +49,7 @@ def trace_direction(
     field, mesh = target.field, target.mesh
     theta = plan.theta_i[index]
     launch = field.entry_rectangle(theta, plan.phi_i)
+    lines = field.entry_lines(launch, plan.n_rays)
     size = min(CHUNK, plan.n_rays)
     state = np.empty((size, wavefront.N_STATE))
     cell = np.empty((size, wavefront.N_CELL), dtype=np.int64)
@@ -58,9 +59,9 @@ def trace_direction(
     for first in range(0, plan.n_rays, size):
         active = np.empty(min(size, plan.n_rays - first), dtype=np.int64)
         wavefront.enter_rays(
-            first, plan.n_rays, launch, shifts, np.sin(theta), np.cos(theta),
-            plan.phi_i or 0.0, plan.phi_i is None, field.z_top, *field.cells,
-            state, cell, active,
+            first, plan.n_rays, launch, lines, shifts, *field.pitch,
+            np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
+            field.z_top, *field.cells, state, cell, active,
         )  # fmt: skip
         while active.size:
             origins = np.empty((active.size, 3), dtype=np.float32)

@@ -61,6 +61,12 @@ class Field:
         nx, ny = self.heights.shape
         return (nx, ny) if self.periodic else (nx - 1, ny - 1)
 
+    def entry_lines(self, launch: np.ndarray, n_rays: int) -> int:
+        """Number of lines that space `n_rays` rays evenly both along and across them."""
+        width, depth = launch[2] * self.pitch[0], launch[3] * self.pitch[1]
+        aspect = min(width, depth) / max(width, depth)
+        return max(1, round(np.sqrt(n_rays * aspect)))
+
     def entry_rectangle(self, theta_i: float, phi_i: float | None) -> np.ndarray:
         """Corner x, y and lengths [cells] of the entry points in the top plane, shape (4,).
 

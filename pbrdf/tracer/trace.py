@@ -31,9 +31,12 @@ def walk_direction(
 ) -> None:
     """Trace one incident direction by the walk over the height field, and add to the tally."""
     theta = plan.theta_i[index]
-    transport.trace_batch(
+    launch = field.entry_rectangle(theta, plan.phi_i)
+    # On a periodic field one pass along each line of entry points finds all first facets
+    trace = transport.sweep_batch if field.periodic else transport.trace_batch
+    trace(
         field.heights, field.maxima, field.levels, field.z_top, field.periodic, *field.pitch,
-        field.entry_rectangle(theta, plan.phi_i),
+        launch, field.entry_lines(launch, plan.n_rays),
         np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
         plan.n_rays, shifts, plan.max_bounces,
         plan.n, plan.kappa, plan.n_stokes,

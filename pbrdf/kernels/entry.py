@@ -1,0 +1,68 @@
+"""Where rays enter: on parallel lines over the surface, along the azimuth of the source.
+
+Ray after ray advances along a line, and line after line across it, so that successive rays
+stay near each other. Lines are evenly spaced from a random start, and so are the rays of a
+line: every point of the entry rectangle is equally likely, and none is far from a ray.
+"""
+
+import math
+
+from pbrdf.kernels import jit
+
+TWO_PI = 2.0 * math.pi
+# Irrational strides: successive lines take evenly spread offsets and azimuths for any count
+STRIDE_OFFSET = 0.6180339887498949
+STRIDE_PHI = 0.7548776662466927
+
+
+@jit(inline="always")
+def fraction(x):
+    """Part of x after the point."""
+    return x - math.floor(x)
+
+
+@jit(inline="always")
+def entry_line(line, n_lines, launch, shifts, phi_i, uniform_phi, pitch_x, pitch_y):
+    """One line of entry points, followed in the direction in which the light travels.
+
+    launch          corner x, y and lengths of the entry rectangle [cells]
+    shifts          random shifts (3,) in [0, 1): lines, offsets, azimuths
+
+    Returns the start (x, y), the speed per unit of s [cells], of which one component is +1 or
+    -1, the range of s, the length of a unit of s [um], the offset of the first ray in units of
+    the ray spacing, and cos and sin of the azimuth of the source.
+    """
+    phi = phi_i
+    if uniform_phi:
+        phi = TWO_PI * fraction(line * STRIDE_PHI + shifts[2])
+    cos_phi = math.cos(phi)
+    sin_phi = math.sin(phi)
+    across = (line + shifts[0]) / n_lines
+    offset = fraction(line * STRIDE_OFFSET + shifts[1])
+    down_x = -cos_phi / pitch_x
+    down_y = -sin_phi / pitch_y
+    if abs(down_x) >= abs(down_y):
+        unit = 1.0 / abs(down_x)
+        start_x = launch[0] if down_x > 0.0 else launch[0] + launch[2]
+        start_y = launch[1] + launch[3] * across
+        length = launch[2]
+    else:
+        unit = 1.0 / abs(down_y)
+        start_x = launch[0] + launch[2] * across
+        start_y = launch[1] if down_y > 0.0 else launch[1] + launch[3]
+        length = launch[3]
+    return (
+        start_x, start_y, down_x * unit, down_y * unit, length, unit, offset, cos_phi, sin_phi,
+    )  # fmt: skip
+
+
+@jit(inline="always")
+def first_ray(line, n_lines, n_rays):
+    """Number of the first ray of a line; the rays are dealt evenly to the lines."""
+    return -((-line * n_rays) // n_lines)
+
+
+@jit(inline="always")
+def wrap_into(x, low, length):
+    """The place x brought into [low, low + length) by whole lengths."""
+    return low + length * fraction((x - low) / length)
