@@ -1,6 +1,6 @@
 """The analytical model as the fit sees it: every number of it may be free."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -40,7 +40,7 @@ class AnalyticModel:
         wavelength = geometry.wavelength if known.all() else None
         if self.model.material.dispersive and wavelength is None:
             msg = (
-                "measurement must hold the wavelength of every geometry for a material whose "
+                "measurement must hold the wavelength of every geometry where the material's "
                 "index depends on it, got none. Add wavelength_um or give n as a number."
             )
             raise ValueError(msg)
@@ -51,12 +51,16 @@ class AnalyticModel:
             for name, value in values.items()
         }
 
-    def mueller(self, values: Mapping[str, Any], geometry: Geometry) -> "casadi.MX":
-        """Return the BRDF, shape (16, N) in row order. [1/sr]"""
+    def mueller(
+        self, values: Mapping[str, Any], geometry: Geometry, elements: Sequence[int]
+    ) -> "casadi.MX":
+        """Return elements of the BRDF, shape (E, N), numbered along the rows. [1/sr]"""
         import casadi
 
         names = tuple(values)
-        function = _one_geometry(names, self.model.shadowing, self.model.slope_distribution)
+        function = _one_geometry(
+            names, tuple(elements), self.model.shadowing, self.model.slope_distribution
+        )
         angles = np.stack(
             [geometry.theta_i, geometry.theta_s, geometry.dphi, geometry.phi_i]
         )
@@ -96,9 +100,12 @@ class AnalyticModel:
 
 @lru_cache(maxsize=64)
 def _one_geometry(
-    names: tuple[str, ...], shadowing: str, slope_distribution: str
+    names: tuple[str, ...],
+    elements: tuple[int, ...],
+    shadowing: str,
+    slope_distribution: str,
 ) -> "casadi.Function":
-    """Return (parameters, angles) -> 16 elements in row order, built once."""
+    """Return (parameters, angles) -> elements, built once."""
     import casadi
 
     from pbrdf.analytic.symbolic import brdf_expression
@@ -113,4 +120,5 @@ def _one_geometry(
         slope_distribution=slope_distribution,
         phi_i=angles[3],
     )
-    return casadi.Function("mueller", [p, angles], [casadi.vec(matrix.T)])
+    rows = casadi.vec(matrix.T)
+    return casadi.Function("mueller", [p, angles], [rows[list(elements)]])

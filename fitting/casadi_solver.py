@@ -1,4 +1,4 @@
-"""Minimise an objective with CasADi: IPOPT on exact derivatives, qpOASES if linear."""
+"""Minimise an objective with CasADi: IPOPT on exact derivatives, DAQP if linear."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -23,10 +23,13 @@ _IPOPT_OPTIONS = {
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
     "ipopt.tol": 1e-11,
-    # An "acceptable" point is no minimum: stop at one only after the restarts below
-    "ipopt.acceptable_iter": 0,
+    # Rounding can keep the gradient above the tolerance: rest counts as an end too
+    "ipopt.acceptable_tol": 1e-9,
+    "ipopt.acceptable_iter": 10,
     "ipopt.bound_relax_factor": 0.0,
 }
+
+_RIDGE = 1e-11
 
 _STATUS = {
     "Solve_Succeeded": "converged",
@@ -110,9 +113,12 @@ def _solve_ipopt(objective: Objective, max_iterations: int) -> Solution:
                 status=status,
             )
             best = better(found, best)
-        if attempt > 0 and best.cost >= previous.cost * (1.0 - 1e-10):
+        stuck = attempt > 0 and best.cost >= previous.cost * (1.0 - 1e-10)
+        if stuck or objective.is_at_rest(best.x):
             break
         scale = objective.step_sizes(best.x)
+    if not best.converged and objective.is_at_rest(best.x):
+        best = replace(best, converged=True, status="converged to rounding error")
     return replace(best, n_evaluations=count)
 
 
@@ -140,7 +146,9 @@ def _ipopt(objective: Objective, max_iterations: int) -> "casadi.Function":
         options: dict[str, Any] = {**_IPOPT_OPTIONS, "ipopt.max_iter": max_iterations}
         if not objective.prediction.second_order:
             weight, none = casadi.MX.sym("w"), casadi.MX.sym("g", 0)
-            curvature = casadi.substitute(expressions.gauss_newton, expressions.x, u * scale)
+            curvature = casadi.substitute(
+                expressions.gauss_newton, expressions.x, u * scale
+            )
             hessian = weight / norm * curvature * (scale @ scale.T)
             options["hess_lag"] = casadi.Function(
                 "nlp_hess_l",
@@ -155,7 +163,7 @@ def _ipopt(objective: Objective, max_iterations: int) -> "casadi.Function":
 
 
 def _solve_linear(objective: Objective) -> Solution:
-    """Solve min |A x - b| in the bounds: qpOASES for the active set, QR for the digits."""
+    """Solve min |A x - b| in the bounds: DAQP for the active set, QR for the digits."""
     import casadi
 
     start = objective.start
@@ -169,32 +177,35 @@ def _solve_linear(objective: Objective) -> Solution:
     length = np.linalg.norm(matrix, axis=0)
     length = np.where(length > 0.0, length, 1.0)
     unit = matrix / length
-    hessian = casadi.DM(unit.T @ unit)
-    options: dict[str, Any] = {"printLevel": "none", "error_on_fail": False}
-    solver = casadi.conic("gains", "qpoases", {"h": hessian.sparsity()}, options)
-    low, high = objective.low * length, objective.high * length
-    answer = solver(h=hessian, g=-(unit.T @ target), lbx=low, ubx=high)
+    low, high, begin = (v * length for v in (objective.low, objective.high, start))
+    # The ridge leaves what the data do not see at the start; QR below takes it off the rest
+    hessian = casadi.DM(unit.T @ unit + _RIDGE * np.eye(len(start)))
+    gradient = -(unit.T @ target) - _RIDGE * begin
+    # qpOASES would do as well, but prints its licence at every call
+    options: dict[str, Any] = {"error_on_fail": False}
+    solver = casadi.conic("gains", "daqp", {"h": hessian.sparsity()}, options)
+    answer = solver(h=hessian, g=gradient, lbx=low, ubx=high)
     if not solver.stats()["success"]:
         return Solution(
             x=start,
             cost=objective.cost(start),
             converged=False,
             status=f"stopped: {solver.stats()['return_status']}",
-            solver="casadi/qpoases",
+            solver="casadi/daqp",
             n_evaluations=1,
         )
     y = np.clip(answer["x"].full().ravel(), low, high)
     margin = 1e-9 * (1.0 + np.linalg.norm(target))
     inside = (y - low > margin) & (high - y > margin)
     y = np.where(inside, y, np.where(y - low <= high - y, low, high))
-    rest = target - unit[:, ~inside] @ y[~inside]
-    y[inside] = np.linalg.lstsq(unit[:, inside], rest, rcond=None)[0]
+    rest = target - unit @ y
+    y[inside] += np.linalg.lstsq(unit[:, inside], rest, rcond=1e-9)[0]
     x = np.clip(y / length, objective.low, objective.high)
     return Solution(
         x=x,
         cost=objective.cost(x),
         converged=True,
         status="converged",
-        solver="casadi/qpoases",
+        solver="casadi/daqp",
         n_evaluations=1,
     )

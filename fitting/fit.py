@@ -62,7 +62,7 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     bounds : mapping of str to (low, high), optional
         In place of those of `PARAMETERS`; None leaves an end as it is.
     solver : {"casadi", "nlopt"}
-        IPOPT (qpOASES where the problem is linear), or SLSQP and Subplex.
+        IPOPT (DAQP where the problem is linear), or SLSQP and Subplex.
     fixed : mapping of str to float, optional
         Values of parameters that are not free, in place of the model's.
     priors : mapping of str to Estimate or (value, stderr), optional

@@ -1,4 +1,4 @@
-"""From the parameters that are free to the numbers a goniometer reads, as one expression."""
+"""From the free parameters to the numbers a goniometer reads, as one expression."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from fitting.aperture import Aperture, rays_through
+from fitting.mixing import Mixing
 from fitting.objective import Prediction
-from fitting.observations import ELEMENTS, LINEAR, Geometry, Observations
+from fitting.observations import LINEAR, Geometry, Observations
 
 if TYPE_CHECKING:
     import casadi
@@ -20,7 +21,7 @@ INSTRUMENT = {"scale": 1.0, "background": 0.0}
 
 
 class MuellerModel(Protocol):
-    """What the fit needs of a reflectance model; analytical and simulated ones follow it."""
+    """What the fit needs of a reflectance model, analytical or simulated."""
 
     @property
     def second_order(self) -> bool:
@@ -29,8 +30,13 @@ class MuellerModel(Protocol):
     def values(self, geometry: Geometry) -> Mapping[str, np.ndarray]:
         """Return the present value of every parameter at each geometry, shape (N,)."""
 
-    def mueller(self, values: Mapping[str, Any], geometry: Geometry) -> "casadi.MX":
-        """Return the BRDF, shape (16, N) in row order; `values` are rows (1, N). [1/sr]"""
+    def mueller(
+        self, values: Mapping[str, Any], geometry: Geometry, elements: Sequence[int]
+    ) -> "casadi.MX":
+        """Return elements of the BRDF, shape (E, N); `values` are rows (1, N). [1/sr]
+
+        Elements are numbered 0 to 15 along the rows of the matrix.
+        """
 
     def updated(self, values: Mapping[str, float]) -> Any:
         """Return the user's model with these values."""
@@ -147,14 +153,15 @@ def predict(
             row = np.broadcast_to(np.asarray(value, dtype=float), rays.parent.shape)
             values[name] = casadi.DM(row.copy()).T
     brdf = {name: value for name, value in values.items() if name not in INSTRUMENT}
-    mueller = casadi.vec(model.mueller(brdf, rays.geometry))
+    mixing = Mixing.of(rays, observations.names)
+    mueller = casadi.vec(model.mueller(brdf, rays.geometry, mixing.elements))
 
     first = np.searchsorted(rays.parent, np.arange(observations.geometry.size))
     scale = casadi.MX(values["scale"])[first.tolist()].T
     background = casadi.MX(values["background"])[first.tolist()].T
 
     def linear(names: np.ndarray, at: np.ndarray) -> Any:
-        weights = _weights(names, at, rays)
+        weights = mixing.matrix(names, at)
         offset = np.array([LINEAR[name].get("M00", 0.0) for name in names])
         where = at.tolist()
         return scale[where] * (weights @ mueller) + background[where] * casadi.DM(offset)
@@ -170,40 +177,17 @@ def _readings(observations: Observations, linear: Any) -> Any:
 
     is_ratio = observations.name == "DOLP"
     plain, ratio = np.flatnonzero(~is_ratio), np.flatnonzero(is_ratio)
-    y = casadi.MX.zeros(len(observations.name))
+    parts = []
     if plain.size:
-        y[plain.tolist()] = linear(observations.name[plain], observations.at[plain])
+        parts.append(linear(observations.name[plain], observations.at[plain]))
     if ratio.size:
         at = observations.at[ratio]
         total, q, u = (
             linear(np.full(at.size, element), at) for element in ("M00", "M10", "M20")
         )
         # The tiny term gives the root a derivative where polarisation vanishes
-        y[ratio.tolist()] = casadi.sqrt((q**2 + u**2) / total**2 + 1e-24)
-    return y
-
-
-def _weights(names: np.ndarray, at: np.ndarray, rays: Any) -> "casadi.DM":
-    """Return the sparse matrix from all Mueller elements of all rays to linear readings."""
-    import casadi
-    from scipy import sparse
-
-    rows, columns, entries = [], [], []
-    order = np.argsort(rays.parent, kind="stable")
-    bounds = np.searchsorted(rays.parent[order], np.arange(at.max() + 2))
-    for name in dict.fromkeys(names.tolist()):
-        pattern = np.zeros((4, 4))
-        for element, coefficient in LINEAR[name].items():
-            pattern.flat[ELEMENTS.index(element)] = coefficient
-        # Element (i, j) of a ray adds turn_out[a, i] turn_in[j, b] to reading (a, b)
-        share = np.einsum(
-            "k,ab,kai,kjb->kij", rays.weight, pattern, rays.turn_out, rays.turn_in
-        ).reshape(-1, 16)
-        for row in np.flatnonzero(names == name):
-            for ray in order[bounds[at[row]] : bounds[at[row] + 1]]:
-                used = np.flatnonzero(share[ray])
-                rows += [row] * used.size
-                columns += (16 * ray + used).tolist()
-                entries += share[ray, used].tolist()
-    shape = (len(names), 16 * len(rays.parent))
-    return casadi.DM(sparse.csc_matrix((entries, (rows, columns)), shape=shape))
+        parts.append(casadi.sqrt((q**2 + u**2) / total**2 + 1e-24))
+    if len(parts) == 1:
+        return parts[0]
+    order = np.argsort(np.concatenate([plain, ratio]))
+    return casadi.vertcat(*parts)[order.tolist()]

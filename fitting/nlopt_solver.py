@@ -138,9 +138,9 @@ def _polish(objective: Objective, x: np.ndarray, limit: int, counts: list[int]) 
             converged, status = True, "converged"
             break
         before = stage.best_cost
-        stage = _Stage(objective, stage.best_x, _whitening(objective, stage.best_x))
+        stage = _Stage(objective, stage.best_x, objective.whitening(stage.best_x))
         optimizer = nlopt.opt(nlopt.LD_SLSQP, len(x))
-        optimizer.set_maxeval(limit)
+        optimizer.set_maxeval(max(limit // 4, 1))
         _exact(optimizer)
         _add_box(optimizer, objective, stage)
         again, status_again = stage.run(optimizer)
@@ -150,7 +150,7 @@ def _polish(objective: Objective, x: np.ndarray, limit: int, counts: list[int]) 
         if stage.best_cost >= before * (1.0 - 1e-13):
             break
     # SLSQP also fails when it starts in the minimum and finds no step down
-    if not converged and _at_rest(objective, stage.best_x):
+    if not converged and objective.is_at_rest(stage.best_x):
         converged, status = True, "converged"
     return Solution(
         x=stage.best_x,
@@ -162,33 +162,10 @@ def _polish(objective: Objective, x: np.ndarray, limit: int, counts: list[int]) 
     )
 
 
-def _at_rest(objective: Objective, x: np.ndarray) -> bool:
-    """Tell whether a Gauss-Newton step would change the cost by less than rounding."""
-    cost, gradient = objective.cost_gradient(x)
-    pressed = ((x <= objective.low) & (gradient > 0)) | (
-        (x >= objective.high) & (gradient < 0)
-    )
-    step = _whitening(objective, x).T @ np.where(pressed, 0.0, gradient)
-    return float(np.linalg.norm(step)) <= 1e-7 * cost
-
-
 def _exact(optimizer: Any) -> None:
     """Let the gradient decide the end, not a tolerance."""
     optimizer.set_xtol_rel(1e-13)
     optimizer.set_ftol_rel(1e-16)
-
-
-def _whitening(objective: Objective, x: np.ndarray) -> np.ndarray:
-    """Return T with T^T J^T J T = 2 cost(x) 1, directions without effect cut at 1e-10."""
-    jacobian = objective.jacobian(x)
-    length = np.linalg.norm(jacobian, axis=0)
-    sizes = objective.sizes(x)
-    if not np.isfinite(length).all() or not length.any():
-        return np.diag(sizes)
-    length = np.where(length > 0.0, length, 1.0 / sizes)
-    _, singular, basis = np.linalg.svd(jacobian / length, full_matrices=False)
-    singular = np.maximum(singular, 1e-10 * singular[0])
-    return np.sqrt(2.0 * objective.cost(x)) * (basis.T / singular) / length[:, None]
 
 
 def _add_box(optimizer: Any, objective: Objective, stage: _Stage) -> None:

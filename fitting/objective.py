@@ -14,7 +14,7 @@ References
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,14 +61,17 @@ LOSSES: dict[str, Callable[[Any], Any]] = {
 }
 
 
-@lru_cache(maxsize=None)
-def _influence(loss: str) -> "casadi.Function":
-    """Return r -> (psi, d psi/dr) of a loss."""
+@cache
+def _loss_functions(loss: str) -> "tuple[casadi.Function, casadi.Function]":
+    """Return z -> rho(z) and r -> (psi, d psi/dr) of a loss."""
     import casadi
 
-    r = casadi.SX.sym("r")
+    z, r = casadi.SX.sym("z"), casadi.SX.sym("r")
     psi = casadi.gradient(0.5 * LOSSES[loss](r**2), r)
-    return casadi.Function("influence", [r], [psi, casadi.gradient(psi, r)])
+    return (
+        casadi.Function("loss", [z], [LOSSES[loss](z)]),
+        casadi.Function("influence", [r], [psi, casadi.gradient(psi, r)]),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +115,7 @@ class Prediction:
     @cached_property
     def expressions(self) -> "Callable[[str], Expressions]":
         """Symbolic cost for a loss, built once for each loss."""
-        return lru_cache(maxsize=None)(lambda loss: Expressions(self, loss))
+        return cache(lambda loss: Expressions(self, loss))
 
 
 class Expressions:
@@ -215,7 +218,15 @@ class Objective:
 
     def cost(self, x: np.ndarray) -> float:
         """Return the cost at x; inf where the curve is not finite."""
-        return self.cost_gradient(x)[0]
+        z = self.residuals(x) ** 2
+        if self.loss != "linear":
+            z = _loss_functions(self.loss)[0](z[None, :]).full().ravel()
+        penalty = [
+            (v - p.prior_value) / p.prior_stderr
+            for v, p in zip(x, self.parameters, strict=True)
+        ]
+        cost = 0.5 * float(z.sum()) + 0.5 * float(np.square(penalty).sum())
+        return cost if np.isfinite(cost) else np.inf
 
     def cost_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the cost and its exact gradient at x, shape (n,)."""
@@ -237,7 +248,7 @@ class Objective:
 
     def influence(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return psi = r rho'(r^2) of each residual at x and its derivative, each (m,)."""
-        psi, bend = _influence(self.loss)(self.residuals(x)[None, :])
+        psi, bend = _loss_functions(self.loss)[1](self.residuals(x)[None, :])
         return psi.full().ravel(), bend.full().ravel()
 
     def sizes(self, x: np.ndarray) -> np.ndarray:
@@ -254,6 +265,29 @@ class Objective:
             curvature = np.linalg.norm(self.jacobian(x), axis=0)
             step = np.sqrt(2.0 * self.cost(x)) / curvature
         return np.where(np.isfinite(step) & (step > 0.0), step, self.sizes(x))
+
+    def whitening(self, x: np.ndarray) -> np.ndarray:
+        """Return T, shape (n, n), with T^T J^T J T = 2 cost(x): steps of equal effect.
+
+        Directions without effect are cut at 1e-10 of the strongest.
+        """
+        jacobian, sizes = self.jacobian(x), self.sizes(x)
+        length = np.linalg.norm(jacobian, axis=0)
+        if not np.isfinite(length).all() or not length.any():
+            return np.diag(sizes)
+        length = np.where(length > 0.0, length, 1.0 / sizes)
+        unit = jacobian / length
+        unit = np.vstack([unit, np.zeros((max(0, len(x) - len(unit)), len(x)))])
+        _, singular, basis = np.linalg.svd(unit, full_matrices=False)
+        singular = np.maximum(singular, 1e-10 * singular[0])
+        return np.sqrt(2.0 * self.cost(x)) * (basis.T / singular) / length[:, None]
+
+    def is_at_rest(self, x: np.ndarray) -> bool:
+        """Tell whether a Gauss-Newton step would change the cost by less than rounding."""
+        cost, gradient = self.cost_gradient(x)
+        pressed = ((x <= self.low) & (gradient > 0)) | ((x >= self.high) & (gradient < 0))
+        step = self.whitening(x).T @ np.where(pressed, 0.0, gradient)
+        return float(np.linalg.norm(step)) <= 1e-7 * cost
 
     def with_data(self, data: np.ndarray, stderr: np.ndarray) -> "Objective":
         """Return the objective for other data or weights on the same prediction."""

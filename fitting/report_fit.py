@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import stats
 
@@ -17,9 +15,6 @@ from fitting.uncertainty import (
     information,
     sandwich,
 )
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 __all__ = ["result_of"]
 
@@ -85,7 +80,6 @@ def result_of(
         log_likelihood=solved.log_likelihood,
         n_estimated=problem.weights.n_estimated,
         stderr_parts=parts,
-        readings=_readings(problem, solved),
         problem=replace(problem, objective=objective),
     )
 
@@ -144,32 +138,3 @@ def _models(problem: Problem, x: np.ndarray) -> dict[str, object]:
         brdf = {name: value for name, value in values.items() if name not in INSTRUMENT}
         models[label] = problem.model.updated(brdf)
     return models
-
-
-def _readings(problem: Problem, solved: Solved) -> "xr.Dataset":
-    """Return every reading beside its fitted value, dimension `reading`."""
-    import xarray as xr
-
-    observations, objective = problem.observations, solved.objective
-    geometry, at = observations.geometry, observations.at
-    predicted = objective.predict(solved.solution.x)
-    labels = np.array(observations.labels)
-    columns = {
-        "measured": objective.data,
-        "model": predicted,
-        "stderr": objective.stderr,
-        "residual": (objective.data - predicted) / objective.stderr,
-    }
-    coords = {
-        "observable": observations.name,
-        "scan": labels[observations.scan[at]],
-        "theta_i": geometry.theta_i[at],
-        "theta_s": geometry.theta_s[at],
-        "dphi": geometry.dphi[at],
-        "theta_view": geometry.theta_view[at],
-        "wavelength": geometry.wavelength[at],
-    }
-    return xr.Dataset(
-        {name: ("reading", value) for name, value in columns.items()},
-        coords={name: ("reading", value) for name, value in coords.items()},
-    )

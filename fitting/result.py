@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,8 +59,8 @@ class FitResult:
     stderr_parts : mapping of str to mapping
         Standard error of each parameter by source: "noise" and each uncertain fixed
         parameter.
-    readings : Dataset
-        Measured, model, stderr and residual of every reading, with its geometry.
+    problem : Problem
+        What was solved, to be solved again with changes.
     """
 
     values: Mapping[str, float]
@@ -80,8 +81,34 @@ class FitResult:
     log_likelihood: float
     n_estimated: int
     stderr_parts: Mapping[str, Mapping[str, float]]
-    readings: "xr.Dataset"
     problem: "Problem" = field(repr=False)
+
+    @cached_property
+    def readings(self) -> "xr.Dataset":
+        """Every reading beside its fitted value, its stderr and geometry, dim `reading`."""
+        import xarray as xr
+
+        observations, objective = self.problem.observations, self.problem.objective
+        geometry, at = observations.geometry, observations.at
+        columns = {
+            "measured": objective.data,
+            "model": objective.predict(np.array(list(self.values.values()))),
+            "stderr": objective.stderr,
+            "residual": self.residuals,
+        }
+        coords = {
+            "observable": observations.name,
+            "scan": np.array(observations.labels)[observations.scan[at]],
+            "theta_i": geometry.theta_i[at],
+            "theta_s": geometry.theta_s[at],
+            "dphi": geometry.dphi[at],
+            "theta_view": geometry.theta_view[at],
+            "wavelength": geometry.wavelength[at],
+        }
+        return xr.Dataset(
+            {name: ("reading", value) for name, value in columns.items()},
+            coords={name: ("reading", value) for name, value in coords.items()},
+        )
 
     @property
     def names(self) -> tuple[str, ...]:
