@@ -10,7 +10,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["gaussian", "histogram_figure", "scan_figure"]
+    from fitting.statistics_histogram import Histogram
+
+__all__ = ["histogram_figure", "new_figure", "scan_figure"]
 
 # Colours that stay apart in print and for colour-blind eyes (Okabe and Ito)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -29,30 +31,23 @@ def new_figure(rows: int, columns: int, size: tuple[float, float]) -> "tuple[Fig
     return figure, axes
 
 
-def gaussian(x: np.ndarray, rms: float) -> np.ndarray:
-    """Return the normal density of zero mean and standard deviation `rms` at x."""
-    return np.exp(-0.5 * (x / rms) ** 2) / (rms * np.sqrt(2.0 * np.pi))
-
-
-def histogram_figure(
-    panels: Sequence[tuple[str, np.ndarray, np.ndarray, float, str]],
-) -> "Figure":
-    """Draw densities beside the Gaussian of the stated rms.
-
-    Parameters
-    ----------
-    panels : sequence of (label, edges, density, rms, legend)
-        Axis label with unit, bin edges (n + 1), density (n), rms of the Gaussian, legend.
-    """
-    figure, axes = new_figure(1, len(panels), (4.6 * len(panels), 3.4))
-    for axis, (label, edges, density, rms, legend) in zip(axes.flat, panels, strict=True):
+def histogram_figure(histograms: "Sequence[Histogram]") -> "Figure":
+    """Draw densities beside the Gaussian of the rms that was measured."""
+    figure, axes = new_figure(1, len(histograms), (4.6 * len(histograms), 3.4))
+    for axis, histogram in zip(axes.flat, histograms, strict=True):
         axis.stairs(
-            density, edges, fill=True, color=COLOURS[5], alpha=0.55, label="measured"
+            histogram.density,
+            histogram.edges,
+            fill=True,
+            color=COLOURS[5],
+            alpha=0.55,
+            label="measured",
         )
-        x = np.linspace(edges[0], edges[-1], 400)
-        axis.plot(x, gaussian(x, rms), color=COLOURS[1], label=legend)
-        axis.set(xlabel=label, ylabel="density")
-        axis.set_ylim(0.0, 1.35 * max(density.max(), gaussian(np.zeros(1), rms)[0]))
+        x = np.linspace(histogram.edges[0], histogram.edges[-1], 400)
+        label = f"Gaussian, rms {histogram.rms:.3g}"
+        axis.plot(x, histogram.gaussian(x), color=COLOURS[1], label=label)
+        axis.set(xlabel=f"{histogram.quantity} [{histogram.units}]", ylabel="density")
+        axis.set_ylim(0.0, 1.3 * max(histogram.density.max(), histogram.gaussian(x).max()))
         axis.legend(frameon=False, fontsize="small", loc="upper left")
     return figure
 

@@ -1,0 +1,328 @@
+"""The whole way: a measured surface and a goniometer scan become a reflectance model.
+
+The surface gives the slope; the slope gives the analytical curve and the random surfaces of
+the Monte Carlo; the scan gives the gains of both curves. The uncertainty of the measured
+slope goes into every fitted number.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from fitting.fit import fit
+from fitting.observations import Mask
+from fitting.result import FitResult
+from fitting.simulated_curve import SimulatedCurve, hemisphere_bins
+from fitting.statistics import surface_statistics
+from fitting.statistics_result import SurfaceStatistics
+from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene, simulate
+
+if TYPE_CHECKING:
+    from data_io import Profile
+    from pbrdf import HeightMap
+
+__all__ = ["PipelineResult", "random_surface", "run_pipeline"]
+
+GAINS = ("specular_gain", "diffuse_albedo")
+# Cells a correlation length: facets then lie within 0.2 % of the surface they stand for
+CELLS = 12
+NODES = 256
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PipelineResult:
+    """What a surface and a scan say together.
+
+    Attributes
+    ----------
+    statistics : SurfaceStatistics
+        Of the measured surface.
+    measurement : Dataset
+        The scan.
+    analytic : FitResult
+        The analytical curve brought to the scan at the measured slope.
+    monte_carlo : FitResult
+        The simulated curve, all bounces, brought to the scan at the measured slope.
+    scan_slope : FitResult or None
+        The simulated curve with the slope free too: what the scan alone asks for. None
+        where the slope is among the free parameters anyway.
+    simulation : Dataset
+        The Monte Carlo, for unit gain.
+    curves : Dataset, dims theta_i, theta_view
+        Both fitted curves in the plane of incidence, and the error of the simulation.
+    unknown : tuple of str
+        What these data cannot tell, in words.
+    seconds : mapping of str to float
+        Elapsed time by stage. [s]
+    """
+
+    statistics: SurfaceStatistics
+    measurement: xr.Dataset
+    analytic: FitResult
+    monte_carlo: FitResult
+    scan_slope: FitResult | None
+    simulation: xr.Dataset
+    curves: xr.Dataset
+    unknown: tuple[str, ...]
+    seconds: Mapping[str, float]
+
+    @property
+    def model(self) -> MicrofacetModel:
+        """The fitted analytical model."""
+        model: MicrofacetModel = self.analytic.model
+        return model
+
+
+def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole way)
+    surface: "Profile | HeightMap",
+    measurement: xr.Dataset,
+    *,
+    material: Material,
+    free: Sequence[str] = GAINS,
+    shadowing: str = "smith-correlated",
+    form: str | int = "tilt",
+    mask: Sequence[Mask] = (),
+    n_rays: int = 200_000,
+    realizations: int = 32,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> PipelineResult:
+    """Measure the surface, fit the analytical curve, simulate, fit the simulated curve.
+
+    Parameters
+    ----------
+    surface : Profile or HeightMap
+        The measured surface; its roughness is taken as isotropic.
+    measurement : Dataset
+        Goniometer scan in the project's conventions, dimension `geometry`, one wavelength.
+    material : Material
+        Index of the surface; the start where n or kappa is free.
+    free : sequence of str
+        Parameters to fit, see `fitting.fit`.
+    shadowing : str
+        Of the analytical model.
+    form : str or int
+        Form to remove from the surface, see `fitting.surface_statistics`.
+    mask : sequence of callable
+        Readings to leave out, see `fitting.masks`.
+    n_rays, realizations, seed, workers
+        Of the Monte Carlo, see `pbrdf.simulate`.
+    progress : callable, optional
+        Called with (stage, steps done, steps in all).
+
+    Returns
+    -------
+    PipelineResult
+
+    Raises
+    ------
+    ValueError
+        If the scan holds several wavelengths, or nothing that the fit can use.
+    """
+    index = Material(*material.index(_wavelength(measurement)), name=material.name)
+    clock = _Clock(progress or (lambda *_: None))
+
+    with clock.stage("surface statistics"):
+        statistics = surface_statistics(surface, form=form)
+    free, priors = _slope_knowledge(statistics, free)
+
+    start = MicrofacetModel(
+        index, slope_rms=statistics.slope_rms.value, shadowing=shadowing
+    )
+    with clock.stage("analytical fit"):
+        analytic = fit(measurement, start, free=free, priors=priors, mask=mask)
+
+    with clock.stage("Monte Carlo"):
+        simulation = _simulate(
+            analytic.model, statistics, measurement,
+            n_rays=n_rays, realizations=realizations, seed=seed, workers=workers,
+            progress=lambda done, total: clock.report("Monte Carlo", done, total),
+        )  # fmt: skip
+
+    with clock.stage("Monte Carlo fit"):
+        curve = SimulatedCurve(simulation, analytic.model)
+        weighed = with_simulation_error(measurement, curve)
+        monte_carlo = fit(weighed, curve, free=free, priors=priors, mask=mask)
+        scan_slope = None
+        if "slope_rms" not in free:
+            scan_slope = fit(weighed, curve, free=(*free, "slope_rms"), mask=mask)
+
+    return PipelineResult(
+        statistics=statistics,
+        measurement=measurement,
+        analytic=analytic,
+        monte_carlo=monte_carlo,
+        scan_slope=scan_slope,
+        simulation=simulation,
+        curves=plane_curves(analytic.model, monte_carlo.model),
+        unknown=(*_unknown(measurement, statistics), *analytic.warnings),
+        seconds=clock.seconds,
+    )
+
+
+def random_surface(statistics: SurfaceStatistics, slope_rms: float) -> GaussianSurface:
+    """Return the Gaussian surface of the measured correlation length and a slope."""
+    corr_length = statistics.corr_length.value
+    return GaussianSurface(
+        shape=(NODES, NODES),
+        spacing=corr_length / CELLS,
+        corr_length=corr_length,
+        slope_rms=slope_rms,
+    )
+
+
+def with_simulation_error(measurement: xr.Dataset, curve: SimulatedCurve) -> xr.Dataset:
+    """Return the scan with the simulation's error added to the standard errors it has.
+
+    A scan without standard errors stays as it is: its noise is estimated from the misfit.
+    """
+    error = curve.stderr(
+        measurement.theta_i.values, measurement.theta_s.values, measurement.dphi.values
+    )
+    weighed = measurement.copy()
+    for out in range(4):
+        for into in range(4):
+            name = f"M{out}{into}_stderr"
+            if name in measurement:
+                weighed[name] = np.hypot(measurement[name], error[:, out, into])
+    return weighed
+
+
+def plane_curves(model: MicrofacetModel, curve: SimulatedCurve) -> xr.Dataset:
+    """Return M00, M10 and DOLP of both models against incidence and signed view angle."""
+    dataset = curve.dataset
+    view = np.concatenate([-dataset.theta_s.values[::-1], dataset.theta_s.values])
+    theta_i, theta_view = np.meshgrid(dataset.theta_i.values, view, indexing="ij")
+    where = theta_i, np.abs(theta_view), np.where(theta_view > 0.0, np.pi, 0.0)
+    flat = [angle.ravel() for angle in where]
+    simulated = curve.brdf(*flat).reshape(*theta_i.shape, 4, 4)
+    error = curve.stderr(*flat).reshape(*theta_i.shape, 4, 4)
+    values = {
+        **{
+            f"analytic_{name}": value
+            for name, value in _summary(model.brdf(*where)).items()
+        },
+        **{f"monte_carlo_{name}": value for name, value in _summary(simulated).items()},
+        "monte_carlo_M00_stderr": error[..., 0, 0],
+        "monte_carlo_M10_stderr": error[..., 1, 0],
+        # M00 and M10 of a bin err together, so their ratio errs less than this
+        "monte_carlo_DOLP_stderr": error[..., 1, 0] / simulated[..., 0, 0],
+    }
+    dims = ("theta_i", "theta_view")
+    return xr.Dataset(
+        {name: (dims, value) for name, value in values.items()},
+        coords={"theta_i": dataset.theta_i.values, "theta_view": view},
+    )
+
+
+def _summary(mueller: np.ndarray) -> dict[str, np.ndarray]:
+    m00, m10, m20 = mueller[..., 0, 0], mueller[..., 1, 0], mueller[..., 2, 0]
+    return {"M00": m00, "M10": m10, "DOLP": np.hypot(m10, m20) / m00}
+
+
+def _simulate(
+    model: MicrofacetModel,
+    statistics: SurfaceStatistics,
+    measurement: xr.Dataset,
+    *,
+    n_rays: int,
+    realizations: int,
+    seed: int,
+    workers: int | None,
+    progress: Callable[[int, int], None],
+) -> xr.Dataset:
+    """Simulate the fitted surface at the incidences of the scan."""
+    slope = float(np.sqrt(np.mean(np.square(model.slope_rms))))
+    n_theta, n_dphi = hemisphere_bins(slope)
+    circular = any("3" in str(name)[1:3] for name in measurement.data_vars)
+    return simulate(
+        Scene(random_surface(statistics, slope), model.material),
+        np.unique(measurement.theta_i.values),
+        phi_i="uniform",
+        n_rays=n_rays,
+        realizations=realizations,
+        seed=seed,
+        n_theta=n_theta,
+        n_dphi=n_dphi,
+        stokes="full" if circular else "linear",
+        workers=workers,
+        progress=progress,
+    )
+
+
+def _slope_knowledge(
+    statistics: SurfaceStatistics, free: Sequence[str]
+) -> tuple[tuple[str, ...], dict[str, tuple[float, float]]]:
+    """Return what to fit and what the surface tells of the slope.
+
+    A slope that the surface does not determine is fitted to the scan instead.
+    """
+    slope = statistics.slope_rms
+    if np.isfinite(slope.stderr):
+        return tuple(free), {"slope_rms": (slope.value, slope.stderr)}
+    return tuple(dict.fromkeys((*free, "slope_rms"))), {}
+
+
+def _wavelength(measurement: xr.Dataset) -> float | None:
+    """Return the one wavelength of the scan, None if it names none. [um]"""
+    if "wavelength" not in measurement.coords:
+        return None
+    found = np.unique(measurement.wavelength.values)
+    found = found[np.isfinite(found)]
+    if found.size > 1:
+        listed = ", ".join(f"{value:g}" for value in found)
+        msg = (
+            f"measurement must hold one wavelength [um], got {listed}. Select one of them."
+        )
+        raise ValueError(msg)
+    return float(found[0]) if found.size else None
+
+
+def _unknown(measurement: xr.Dataset, statistics: SurfaceStatistics) -> Iterator[str]:
+    """Name what this scan and this surface cannot tell."""
+    names = {
+        str(name) for name in measurement.data_vars if not str(name).endswith("_stderr")
+    }
+    polarised = names - {"M00"}
+    if not polarised:
+        yield (
+            "Only unpolarised reflectance was measured. M10 and DOLP of both curves follow "
+            "from the index that was given; no measurement supports them. specular_gain "
+            "and diffuse_albedo are told apart by the shape of M00 alone."
+        )
+    if names == {"DOLP"}:
+        yield (
+            "Only DOLP was measured. It fixes the ratio of diffuse_albedo to "
+            "specular_gain, and neither of the two."
+        )
+    if polarised and not any("3" in name[1:] for name in polarised if name[0] == "M"):
+        yield "No element with V was measured; the circular part is a prediction."
+    if np.unique(measurement.theta_i.values.round(6)).size == 1:
+        yield "One incidence was measured; others are predictions."
+    if not np.isfinite(statistics.slope_rms.stderr):
+        yield "The surface does not determine the slope; it was fitted to the scan instead."
+
+
+@dataclass
+class _Clock:
+    """Elapsed time by stage. [s]"""
+
+    report: Progress
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time the block under this name."""
+        self.report(name, 0, 1)
+        begin = perf_counter()
+        yield
+        self.seconds[name] = perf_counter() - begin
+        self.report(name, 1, 1)
