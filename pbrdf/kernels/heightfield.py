@@ -93,7 +93,7 @@ def fall(heights, periodic, i, j, u, v, z, speed_z):
     return HIT, i, j, facet, u, v, plane_height(z00, z10, z01, z11, facet, u, v)
 
 
-@jit
+@jit(inline="always")
 def walk(
     heights, maxima, levels, z_top, periodic,
     i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, max_steps,

@@ -21,7 +21,7 @@ def turn_stokes(q, u, turn):
     return turn[0] * q + turn[1] * u, turn[0] * u - turn[1] * q
 
 
-@jit
+@jit(inline="always")
 def reflect_once(cos_beta, turn, n, kappa, n_stokes, mueller):
     """Mueller matrix R(out) F(beta) R(in) of a path with one bounce, paper eq. (16)."""
     a, b, c, d = reflection_elements(cos_beta[0], n, kappa)
@@ -73,14 +73,15 @@ def reflect_often(cos_beta, turn, n_bounces, n, kappa, n_stokes, mueller):
         mueller[2, column] = u
 
 
-@jit
+@jit(inline="always")
 def tally_path(
     fate_count, cos_beta, turn, bounces, k_x, k_y, k_z, cos_phi_i, sin_phi_i,
-    n, kappa, n_stokes, mueller, brdf, energy, counts,
+    n, kappa, n_stokes, zenith, azimuth, mueller, brdf, energy, counts,
 ):  # fmt: skip
     """Count one path and add its light to its bin, or to what was lost.
 
-    `fate_count` is one of the N_ constants; brdf, energy and counts are added to.
+    `fate_count` is one of the N_ constants, `zenith` and `azimuth` are `bin_edges`; brdf,
+    energy and counts are added to.
     """
     counts[fate_count] += 1
     counts[N_SEGMENTS] += bounces + 1
@@ -91,7 +92,7 @@ def tally_path(
     i_theta, i_dphi = 0, 0
     if escaped:
         i_theta, i_dphi = bin_of_direction(
-            k_x, k_y, k_z, cos_phi_i, sin_phi_i, brdf.shape[2], brdf.shape[3]
+            k_x, k_y, k_z, cos_phi_i, sin_phi_i, zenith, azimuth
         )
     order = min(bounces, brdf.shape[1]) - 1
     for w in range(n.shape[0]):
@@ -104,6 +105,11 @@ def tally_path(
             energy[w, TRUNCATED if fate_count == N_TRUNCATED else LEAKED] += mueller[0, 0]
             continue
         place = brdf[w, order, i_theta, i_dphi]
-        for row in range(n_stokes):
-            for column in range(n_stokes):
-                place[row, column] += mueller[row, column]
+        if n_stokes == 4:
+            for row in range(4):
+                for column in range(4):
+                    place[row, column] += mueller[row, column]
+        else:
+            for row in range(n_stokes):
+                for column in range(n_stokes):
+                    place[row, column] += mueller[row, column]

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from pbrdf.kernels import jit
+from pbrdf.kernels.binning import bin_edges
 from pbrdf.kernels.entry import entry_line, first_ray, wrap_into
 from pbrdf.kernels.frames import PARALLEL, turn_frame
 from pbrdf.kernels.heightfield import (
@@ -81,7 +82,7 @@ def exit_turn(k_x, k_y, k_z, s_x, s_y, s_z, cos_phi_i, sin_phi_i):
     return turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, m_x, m_y, 0.0)
 
 
-@jit
+@jit(inline="always")
 def follow_path(
     heights, maxima, levels, z_top, periodic, pitch_x, pitch_y,
     fate, i, j, facet, u, v, z, cos_phi, sin_phi, sin_theta_i, cos_theta_i,
@@ -147,6 +148,7 @@ def trace_batch(
     cos_beta = np.empty(max_bounces)
     turn = np.empty((max_bounces + 1, 2))
     mueller = np.zeros((4, 4))
+    zenith, azimuth = bin_edges(brdf.shape[2], brdf.shape[3])
     for line in range(n_lines):
         start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = entry_line(
             line, n_lines, launch, shifts, phi_i, uniform_phi, pitch_x, pitch_y
@@ -171,7 +173,7 @@ def trace_batch(
             )  # fmt: skip
             tally_path(
                 count, cos_beta, turn, bounces, k_x, k_y, k_z, cos_phi, sin_phi,
-                n, kappa, n_stokes, mueller, brdf, energy, counts,
+                n, kappa, n_stokes, zenith, azimuth, mueller, brdf, energy, counts,
             )  # fmt: skip
 
 
@@ -192,6 +194,7 @@ def sweep_batch(
     cos_beta = np.empty(max_bounces)
     turn = np.empty((max_bounces + 1, 2))
     mueller = np.zeros((4, 4))
+    zenith, azimuth = bin_edges(brdf.shape[2], brdf.shape[3])
     for line in range(n_lines):
         start_x, start_y, speed_x, speed_y, length, unit, offset, cos_phi, sin_phi = entry_line(
             line, n_lines, launch, shifts, phi_i, uniform_phi, pitch_x, pitch_y
@@ -253,7 +256,7 @@ def sweep_batch(
                         )  # fmt: skip
                         tally_path(
                             count, cos_beta, turn, bounces, k_x, k_y, k_z, cos_phi, sin_phi,
-                            n, kappa, n_stokes, mueller, brdf, energy, counts,
+                            n, kappa, n_stokes, zenith, azimuth, mueller, brdf, energy, counts,
                         )  # fmt: skip
                         ray += 1
                         lag = length * ((ray + offset) / rays)

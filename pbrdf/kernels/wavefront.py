@@ -139,7 +139,7 @@ def leave_domain(pitch_x, pitch_y, i, j, place, low_x, low_y, high_x, high_y):
 def advance_rays(
     heights, periodic, pitch_x, pitch_y, z_top, z_bottom, guard_x, guard_y, faces, max_bounces,
     state, cell, active, cos_beta, turn,
-    n, kappa, n_stokes, mueller, brdf, energy, counts,
+    n, kappa, n_stokes, zenith, azimuth, mueller, brdf, energy, counts,
 ):  # fmt: skip
     """Take the active rays through the answers of Embree, and tally those whose path ends.
 
@@ -222,6 +222,7 @@ def advance_rays(
         )  # fmt: skip
         tally_path(
             end, cos_beta[k], turn[k], bounces, place[KX], place[KY], place[KZ],
-            place[COS_PHI], place[SIN_PHI], n, kappa, n_stokes, mueller, brdf, energy, counts,
+            place[COS_PHI], place[SIN_PHI], n, kappa, n_stokes, zenith, azimuth,
+            mueller, brdf, energy, counts,
         )  # fmt: skip
     return kept

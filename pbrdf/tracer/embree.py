@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.kernels import wavefront
+from pbrdf.kernels.binning import bin_edges
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.mesh import Mesh, build_mesh
 from pbrdf.tracer.plan import Plan, Tally
@@ -56,6 +57,7 @@ def trace_direction(
     cos_beta = np.empty((size, plan.max_bounces))
     turn = np.empty((size, plan.max_bounces + 1, 2))
     mueller = np.zeros((4, 4))
+    zenith, azimuth = bin_edges(plan.n_theta, plan.n_dphi)
     for first in range(0, plan.n_rays, size):
         active = np.empty(min(size, plan.n_rays - first), dtype=np.int64)
         wavefront.enter_rays(
@@ -74,7 +76,7 @@ def trace_direction(
                 field.heights, field.periodic, *field.pitch, field.z_top, field.z_bottom,
                 *mesh.guard, target.first_faces(origins, directions), plan.max_bounces,
                 state, cell, active, cos_beta, turn,
-                plan.n, plan.kappa, plan.n_stokes, mueller,
+                plan.n, plan.kappa, plan.n_stokes, zenith, azimuth, mueller,
                 tally.flux[index], tally.energy[index], tally.counts[index],
             )  # fmt: skip
             active = active[:kept]
