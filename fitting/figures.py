@@ -1,6 +1,6 @@
-"""Figures of a surface, and of a scan beside its models."""
+"""Figures of a surface, of a scan beside its models, and of a simulated hemisphere."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +12,12 @@ if TYPE_CHECKING:
 
     from fitting.statistics_histogram import Histogram
 
-__all__ = ["histogram_figure", "new_figure", "scan_figure"]
+__all__ = ["hemisphere_figure", "histogram_figure", "new_figure", "scan_figure"]
 
 # Colours that stay apart in print and for colour-blind eyes (Okabe and Ito)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 QUANTITIES = {"M00": "M00 [1/sr]", "M10": "M10 [1/sr]", "DOLP": "DOLP [1]"}
+MODELS = {"monte_carlo": ("Monte Carlo", "-"), "analytic": ("analytical", "--")}
 
 
 def new_figure(rows: int, columns: int, size: tuple[float, float]) -> "tuple[Figure, Any]":
@@ -52,125 +53,164 @@ def histogram_figure(histograms: "Sequence[Histogram]") -> "Figure":
     return figure
 
 
-def scan_figure(measured: xr.Dataset, curves: xr.Dataset) -> "Figure":
+def scan_figure(measured: xr.Dataset, curves: xr.Dataset | None = None) -> "Figure":
     """Draw M00, M10 and DOLP against view angle: measured, analytical and Monte Carlo.
 
     Parameters
     ----------
     measured : Dataset, dim geometry
         In-plane rows with theta_view [rad], theta_i [rad] and any of the quantities.
-    curves : Dataset, dims theta_i, theta_view
+    curves : Dataset, dims theta_i, theta_view, optional
         `analytic_*`, `monte_carlo_*` and `monte_carlo_*_stderr` of each quantity.
     """
-    spread = _spans_decades(measured, curves)
-    figure, axes = new_figure(2, len(QUANTITIES), (4.3 * len(QUANTITIES), 5.6))
+    measured = _with_dolp(measured)
+    incidences = np.unique(measured.theta_i.values.round(9))
+    rows = 1 if curves is None else 2
+    figure, axes = new_figure(rows, len(QUANTITIES), (4.3 * len(QUANTITIES), 2.8 * rows))
     for column, (name, label) in enumerate(QUANTITIES.items()):
-        upper, lower = axes[:, column]
-        for colour, theta_i in zip(
-            _cycle(curves.theta_i.size), curves.theta_i, strict=True
-        ):
-            scan = measured.isel(
-                geometry=np.abs(measured.theta_i.values - float(theta_i)) < 1e-9
-            )
-            _draw_scan(upper, lower, name, scan, curves.sel(theta_i=theta_i), colour)
+        upper = axes[0, column]
+        for position, theta_i in enumerate(incidences):
+            scan = measured.isel(geometry=np.abs(measured.theta_i.values - theta_i) < 1e-8)
+            colour = COLOURS[position % len(COLOURS)]
+            if curves is not None:
+                curve = curves.sel(theta_i=theta_i, method="nearest")
+                _draw_curves(upper, name, curve, colour)
+                _draw_residuals(axes[1, column], name, scan, curve, colour)
+            _draw_points(upper, name, scan, colour)
         upper.set_title(label, fontsize="medium")
         if name not in measured:
             upper.text(
-                0.5,
-                0.96,
-                "not measured",
-                transform=upper.transAxes,
-                ha="center",
-                va="top",
-                fontsize="small",
-                style="italic",
-            )
-        if name == "M00" and spread:
+                0.5, 0.96, "not measured", transform=upper.transAxes, ha="center", va="top",
+                fontsize="small", style="italic",
+            )  # fmt: skip
+            if rows == 2:
+                axes[1, column].set_visible(False)
+        elif name == "M00" and _spans_decades(measured[name].values):
             upper.set_yscale("log")
-        lower.axhline(0.0, color="0.4", linewidth=0.8)
-        lower.set(xlabel="view angle [deg], + forward", xlim=(-90, 90))
-        upper.set(xlim=(-90, 90))
-        for axis in (upper, lower):
-            axis.set_xticks(range(-90, 91, 30))
-    axes[1, 0].set_ylabel("measured - model")
+    for axis in axes.flat:
+        axis.set(xlim=(-90, 90), xticks=range(-90, 91, 30))
+    for axis in axes[-1]:
+        axis.set_xlabel("view angle [deg], + forward")
+    if rows == 2:
+        axes[1, 0].set_ylabel("measured - model")
     handles, labels = axes[0, 0].get_legend_handles_labels()
+    columns = min(len(labels), 6)
     figure.legend(
-        handles,
-        labels,
-        loc="outside upper center",
-        ncols=min(len(labels), 6),
-        frameon=False,
+        handles, labels, loc="outside upper center", ncols=columns, frameon=False,
         fontsize="small",
-    )
+    )  # fmt: skip
     return figure
 
 
-def _cycle(count: int) -> list[str]:
-    return [COLOURS[index % len(COLOURS)] for index in range(count)]
+def hemisphere_figure(simulation: xr.Dataset, theta_i: float) -> "Figure":
+    """Draw M00, M10 and DOLP of a simulation over the hemisphere, forward to the right.
+
+    Parameters
+    ----------
+    simulation : Dataset
+        What `pbrdf.simulate` returns.
+    theta_i : float
+        Which incidence; the nearest one is drawn. [rad]
+    """
+    from matplotlib.figure import Figure
+
+    here = simulation.brdf_total.sel(theta_i=theta_i, method="nearest")
+    here = here.transpose("theta_s", "dphi", "stokes_out", "stokes_in")
+    step = here.theta_s.values[0]
+    zenith = np.rad2deg(np.append(here.theta_s.values - step, np.pi / 2))
+    # Bins are centred on dphi = 0; forward, dphi = pi, is drawn to the right
+    width = 2.0 * np.pi / here.dphi.size
+    azimuth = np.append(here.dphi.values, 2.0 * np.pi) - 0.5 * width + np.pi
+    panels = list(_hemisphere_panels(here))
+    figure = Figure(figsize=(4.2 * len(panels), 3.9), layout="constrained")
+    for column, (title, values, colours, limits) in enumerate(panels):
+        axis = figure.add_subplot(1, len(panels), column + 1, projection="polar")
+        image = axis.pcolormesh(
+            azimuth, zenith, values, cmap=colours, vmin=limits[0], vmax=limits[1]
+        )
+        axis.set(title=title, xticklabels=[], yticks=(30, 60))
+        axis.grid(alpha=0.3)
+        figure.colorbar(image, ax=axis, shrink=0.75)
+    angle = np.rad2deg(float(here.theta_i))
+    figure.suptitle(f"incidence {angle:.4g}°, source on the left", fontsize="medium")
+    return figure
 
 
-def _spans_decades(measured: xr.Dataset, curves: xr.Dataset) -> bool:
-    values = measured["M00"].values if "M00" in measured else curves["analytic_M00"].values
+def _hemisphere_panels(
+    brdf: xr.DataArray,
+) -> Iterator[tuple[str, np.ndarray, str, tuple[float, float]]]:
+    """Yield title, values, colour map and limits of each panel."""
+    m00 = brdf.sel(stokes_out="I", stokes_in="I").values
+    yield "M00 [1/sr]", m00, "viridis", (0.0, float(np.percentile(m00, 99.5)))
+    if "Q" not in brdf.stokes_out.values:
+        return
+    m10 = brdf.sel(stokes_out="Q", stokes_in="I").values
+    m20 = brdf.sel(stokes_out="U", stokes_in="I").values
+    reach = float(np.percentile(np.abs(m10), 99.5))
+    yield "M10 [1/sr]", m10, "RdBu_r", (-reach, reach)
+    with np.errstate(invalid="ignore"):
+        yield "DOLP [1]", np.hypot(m10, m20) / m00, "viridis", (0.0, 1.0)
+
+
+def _with_dolp(measured: xr.Dataset) -> xr.Dataset:
+    """Return the scan with DOLP from M00, M10 and M20 where it was not given."""
+    if "DOLP" in measured or not {"M00", "M10"} <= set(measured.data_vars):
+        return measured
+    m20 = measured["M20"].fillna(0.0) if "M20" in measured else 0.0
+    dolp = np.hypot(measured.M10, m20) / measured.M00
+    derived = measured.assign(DOLP=dolp.where(measured.M00 > 0.0))
+    if "M10_stderr" in measured:
+        derived["DOLP_stderr"] = measured.M10_stderr / measured.M00
+    return derived
+
+
+def _spans_decades(values: np.ndarray) -> bool:
     values = values[values > 0.0]
     return bool(values.size) and float(values.max() / np.median(values)) > 30.0
 
 
-def _draw_scan(
-    upper: "Axes",
-    lower: "Axes",
-    name: str,
-    scan: xr.Dataset,
-    curve: xr.Dataset,
-    colour: str,
-) -> None:
-    """Draw one incidence: points, both models, and what the points lack of each model."""
-    incidence = f"{np.rad2deg(float(curve.theta_i)):.4g}°"
+def _incidence(dataset: xr.Dataset) -> str:
+    return f"{np.rad2deg(float(np.mean(dataset.theta_i))):.4g}°"
+
+
+def _draw_curves(axis: "Axes", name: str, curve: xr.Dataset, colour: str) -> None:
+    """Draw both models of one incidence, with the 95 % band of the simulation."""
     view = np.rad2deg(curve.theta_view.values)
-    models = {"monte_carlo": ("Monte Carlo", "-"), "analytic": ("analytical", "--")}
-    for model, (label, style) in models.items():
-        if f"{model}_{name}" not in curve:
-            continue
-        upper.plot(
-            view,
-            curve[f"{model}_{name}"],
-            style,
-            color=colour,
-            linewidth=1.3,
-            label=f"{label} {incidence}",
-        )
+    for model, (label, style) in MODELS.items():
+        value = curve[f"{model}_{name}"]
+        axis.plot(
+            view, value, style, color=colour, linewidth=1.3,
+            label=f"{label} {_incidence(curve)}",
+        )  # fmt: skip
         if f"{model}_{name}_stderr" in curve:
-            value, error = curve[f"{model}_{name}"], 1.96 * curve[f"{model}_{name}_stderr"]
-            upper.fill_between(
+            error = 1.96 * curve[f"{model}_{name}_stderr"]
+            axis.fill_between(
                 view, value - error, value + error, color=colour, alpha=0.2, linewidth=0
             )
-    if name not in scan or not scan.sizes["geometry"]:
+
+
+def _draw_points(axis: "Axes", name: str, scan: xr.Dataset, colour: str) -> None:
+    if name not in scan:
         return
-    at = np.rad2deg(scan.theta_view.values)
     error = scan[f"{name}_stderr"].values if f"{name}_stderr" in scan else None
-    upper.errorbar(
-        at,
-        scan[name],
-        error,
-        fmt="o",
-        markersize=2.6,
-        elinewidth=0.7,
-        color=colour,
-        mfc="white",
-        mew=0.8,
-        label=f"measured {incidence}",
-        zorder=3,
-    )
-    for model, (_, style) in models.items():
-        if f"{model}_{name}" not in curve:
-            continue
-        order = np.argsort(at)
-        model_here = np.interp(at[order], view, curve[f"{model}_{name}"])
-        lower.plot(
-            at[order],
-            scan[name].values[order] - model_here,
-            style,
-            color=colour,
-            linewidth=1.0,
-            marker="." if style == "-" else None,
-            markersize=3,
-        )
+    axis.errorbar(
+        np.rad2deg(scan.theta_view.values), scan[name].values, error,
+        fmt="o", markersize=2.6, elinewidth=0.7, color=colour, mfc="white", mew=0.8,
+        label=f"measured {_incidence(scan)}", zorder=3,
+    )  # fmt: skip
+
+
+def _draw_residuals(
+    axis: "Axes", name: str, scan: xr.Dataset, curve: xr.Dataset, colour: str
+) -> None:
+    """Draw what the points of one incidence show beyond each model."""
+    axis.axhline(0.0, color="0.4", linewidth=0.8)
+    if name not in scan:
+        return
+    at = scan.theta_view.values
+    for model, (_, style) in MODELS.items():
+        there = np.interp(at, curve.theta_view.values, curve[f"{model}_{name}"].values)
+        axis.plot(
+            np.rad2deg(at), scan[name].values - there, style, color=colour, linewidth=1.0,
+            marker="." if style == "-" else None, markersize=3,
+        )  # fmt: skip

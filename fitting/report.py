@@ -16,11 +16,15 @@ if TYPE_CHECKING:
     from fitting.pipeline import PipelineResult
     from fitting.result import FitResult
 
-__all__ = ["estimate_rows", "result_dataset", "write_report"]
+__all__ = ["fit_columns", "result_dataset", "write_report"]
 
 
 def write_report(
-    result: "PipelineResult", folder: Path, *, inputs: Mapping[str, str] | None = None
+    result: "PipelineResult",
+    folder: Path,
+    *,
+    inputs: Mapping[str, str] | None = None,
+    seconds: Mapping[str, float] | None = None,
 ) -> None:
     """Write model.toml, result.nc, the figures and report.html into a folder.
 
@@ -32,6 +36,8 @@ def write_report(
         An existing folder.
     inputs : mapping of str to str, optional
         What went in, for the report: surface, scan, index.
+    seconds : mapping of str to float, optional
+        Time of what came before the pipeline. [s]
     """
     figures = {
         "surface.png": html.png(histogram_figure(_histograms(result))),
@@ -43,7 +49,8 @@ def write_report(
         (folder / name).write_bytes(image)
     data_io.write_result(result_dataset(result), folder / "result.nc")
     data_io.write_model(result.model, folder / "model.toml", notes=_notes(result))
-    page = html.page("Reflectance model", _sections(result, figures, inputs or {}))
+    times = {**(seconds or {}), **result.seconds}
+    page = html.page("Reflectance model", _sections(result, figures, inputs or {}, times))
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -67,17 +74,23 @@ def result_dataset(result: "PipelineResult") -> xr.Dataset:
     return together
 
 
-def estimate_rows(fits: "Mapping[str, FitResult]") -> Iterator[tuple[str, ...]]:
+def _estimate_rows(fits: "Mapping[str, FitResult]") -> Iterator[tuple[str, ...]]:
     """Yield (parameter, then value with interval in each fit) for a table."""
     names = dict.fromkeys(name for fit in fits.values() for name in fit.values)
     for name in names:
         yield (name, *(str(fit.estimates.get(name, "held")) for fit in fits.values()))
 
 
-def _fits(result: "PipelineResult") -> "dict[str, FitResult]":
-    fits = {"analytical": result.analytic, "Monte Carlo": result.monte_carlo}
+def fit_columns(result: "PipelineResult") -> "dict[str, FitResult]":
+    """Return the fits under the titles that report and terminal give them."""
+    held = "slope_rms" not in result.analytic.values
+    slope = "slope of the surface" if held else "slope fitted"
+    fits = {
+        f"Analytical, {slope}": result.analytic,
+        f"Monte Carlo, {slope}": result.monte_carlo,
+    }
     if result.scan_slope is not None:
-        fits["Monte Carlo, slope from the scan"] = result.scan_slope
+        fits["Monte Carlo, slope from the scan alone"] = result.scan_slope
     return fits
 
 
@@ -110,9 +123,12 @@ def _plain(estimate: Estimate) -> dict[str, object]:
 
 
 def _sections(
-    result: "PipelineResult", figures: Mapping[str, bytes], inputs: Mapping[str, str]
+    result: "PipelineResult",
+    figures: Mapping[str, bytes],
+    inputs: Mapping[str, str],
+    seconds: Mapping[str, float],
 ) -> Iterator[str]:
-    statistics, fits = result.statistics, _fits(result)
+    statistics, fits = result.statistics, fit_columns(result)
     yield html.section("What went in", html.table(("", ""), inputs.items()))
     yield html.section(
         "Surface",
@@ -131,7 +147,7 @@ def _sections(
     )
     yield html.section(
         "Model",
-        html.table(("parameter", *fits), estimate_rows(fits)),
+        html.table(("parameter", *fits), _estimate_rows(fits)),
         html.paragraph(
             "Value ± standard error and 95 % interval. The errors include the noise of the "
             "scan and, where the slope is held at that of the surface, its uncertainty."
@@ -161,7 +177,7 @@ def _sections(
         "Time",
         html.table(
             ("stage", "seconds"),
-            [(stage, f"{seconds:.1f}") for stage, seconds in result.seconds.items()],
+            [(stage, f"{elapsed:.1f}") for stage, elapsed in seconds.items()],
         ),
     )
 

@@ -12,7 +12,7 @@ References
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -61,7 +61,7 @@ class SimulatedCurve:
     dataset: xr.Dataset
     model: "MicrofacetModel"
     simulated: "MicrofacetModel | None" = None
-    second_order = True
+    first_order: ClassVar[frozenset[str]] = frozenset()
 
     def values(self, geometry: Geometry) -> dict[str, np.ndarray]:
         """Return every parameter at each geometry, shape (N,)."""

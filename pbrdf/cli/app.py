@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from pbrdf import __version__
+from pbrdf.cli.pipeline import pipeline
 
 __all__ = ["app", "main"]
 
@@ -44,6 +45,9 @@ def _options(
     ] = False,
 ) -> None:
     """Polarised reflectance of real rough surfaces: measured, simulated and fitted."""
+
+
+app.command()(pipeline)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,0 +1,155 @@
+"""Options that several commands share, each written once."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = [
+    "Blocked",
+    "Force",
+    "FormOption",
+    "Free",
+    "Index",
+    "Kappa",
+    "Kind",
+    "KindOption",
+    "Output",
+    "Rays",
+    "Realizations",
+    "Scan",
+    "Seed",
+    "Shadowing",
+    "Spacing",
+    "Surface",
+    "UmPerPixel",
+    "Unit",
+    "Wavelength",
+    "Workers",
+    "form",
+    "names",
+    "numbers",
+]
+
+
+class Kind(StrEnum):
+    """What a surface file holds."""
+
+    auto = "auto"
+    profile = "profile"
+    map = "map"
+    image = "image"
+
+
+Surface = Annotated[
+    Path,
+    typer.Argument(
+        help="Profile (x, z), height map, or micrograph of an edge.", show_default=False
+    ),
+]
+Scan = Annotated[
+    Path,
+    typer.Argument(help="Goniometer file; the format is recognised.", show_default=False),
+]
+KindOption = Annotated[
+    Kind,
+    typer.Option("--kind", help="What the surface file holds, if not as its name says."),
+]
+UmPerPixel = Annotated[
+    float | None,
+    typer.Option(min=1e-6, max=1e4, help="Scale of a micrograph [um per pixel]."),
+]
+Spacing = Annotated[
+    float | None,
+    typer.Option(
+        "--spacing-um", min=1e-6, max=1e6, help="Grid step of a map that names none."
+    ),
+]
+Unit = Annotated[
+    str | None,
+    typer.Option(help="Length unit of a file that names none: nm, um, mm or m."),
+]
+FormOption = Annotated[
+    str,
+    typer.Option(
+        "--form", help="Form to remove first: none, mean, tilt, curvature, a degree."
+    ),
+]
+Blocked = Annotated[
+    float,
+    typer.Option(
+        "--blocked-deg",
+        min=0.0,
+        max=45.0,
+        help="Leave out readings this near to retro-reflection.",
+    ),
+]
+Index = Annotated[
+    float, typer.Option("--n", min=0.01, max=1e6, help="Real part of the refractive index.")
+]
+Kappa = Annotated[
+    float,
+    typer.Option(min=0.0, max=1e3, help="Imaginary part, n + i kappa; positive absorbs."),
+]
+Wavelength = Annotated[
+    float | None,
+    typer.Option(
+        "--wavelength-um", min=0.01, max=1e3, help="Use only rows of this wavelength."
+    ),
+]
+Free = Annotated[
+    str,
+    typer.Option(
+        help="Parameters to fit, separated by commas: specular_gain, n, kappa, ..."
+    ),
+]
+Shadowing = Annotated[str, typer.Option(help="Shadowing of the analytical model.")]
+Rays = Annotated[
+    int,
+    typer.Option(
+        "--n-rays", min=1000, max=10**9, help="Rays an incidence and realisation."
+    ),
+]
+Realizations = Annotated[
+    int, typer.Option(min=1, max=100_000, help="Independent random surfaces.")
+]
+Seed = Annotated[int, typer.Option(min=0, help="Makes the run reproducible, bit for bit.")]
+Workers = Annotated[
+    int | None, typer.Option(min=1, max=1024, help="Threads; all cores if not given.")
+]
+Output = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", help="Where to write; nothing is overwritten."),
+]
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace the output of an earlier run.")
+]
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Return the names of a list separated by commas."""
+    return tuple(word.strip() for word in text.split(",") if word.strip())
+
+
+def numbers(text: str, option: str) -> list[float]:
+    """Return the numbers of a list separated by commas.
+
+    Raises
+    ------
+    ValueError
+        If a word is no number.
+    """
+    found = []
+    for word in names(text):
+        try:
+            found.append(float(word))
+        except ValueError:
+            msg = f"{option} must be numbers separated by commas, got {word!r} in {text!r}."
+            raise ValueError(msg) from None
+    return found
+
+
+def form(text: str) -> str | int:
+    """Return the degree of a polynomial as a number, any other form as it is."""
+    return int(text) if text.isdigit() else text

@@ -1,0 +1,116 @@
+"""`pbrdf pipeline`: surface and scan in, reflectance model out."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import typer
+
+from pbrdf.cli import options
+from pbrdf.cli.options import Kind
+
+if TYPE_CHECKING:
+    from fitting.pipeline import PipelineResult
+
+
+def pipeline(
+    surface: options.Surface,
+    scan: options.Scan,
+    n: options.Index,
+    kappa: options.Kappa = 0.0,
+    output: options.Output = None,
+    force: options.Force = False,
+    kind: options.KindOption = Kind.auto,
+    um_per_pixel: options.UmPerPixel = None,
+    spacing: options.Spacing = None,
+    unit: options.Unit = None,
+    form: options.FormOption = "tilt",
+    wavelength: options.Wavelength = None,
+    free: options.Free = "specular_gain,diffuse_albedo",
+    shadowing: options.Shadowing = "smith-correlated",
+    blocked: options.Blocked = 0.0,
+    n_rays: options.Rays = 200_000,
+    realizations: options.Realizations = 32,
+    seed: options.Seed = 0,
+    workers: options.Workers = None,
+) -> None:
+    """Turn a measured surface and its goniometer scan into a polarised reflectance model.
+
+    Writes a folder with report.html, model.toml (load it with data_io.read_model),
+    result.nc and the figures.
+
+    Example: pbrdf pipeline edge.png scan.csv --um-per-pixel 0.5 --n 1.53
+    """
+    begin = perf_counter()
+    from pbrdf import Material
+    from pbrdf.cli.progress import StageBars
+    from pbrdf.cli.reading import read_scan, read_surface
+    from pbrdf.cli.staging import staged_folder
+
+    target = output or Path(f"{scan.stem}-model")
+    material = Material(n, kappa)
+    with ExitStack() as stack:
+        # A target that may not be written is refused before the work, not after
+        stage = stack.enter_context(staged_folder(target, force=force))
+        heights = read_surface(
+            surface, kind=kind, um_per_pixel=um_per_pixel, spacing=spacing, unit=unit
+        )
+        measurement = read_scan(scan, wavelength=wavelength)
+        reading = perf_counter() - begin
+
+        from fitting.masks import blocked_detector, zeros
+        from fitting.pipeline import run_pipeline
+        from fitting.report import write_report
+
+        bars = stack.enter_context(StageBars())
+        result = run_pipeline(
+            heights,
+            measurement,
+            material=material,
+            free=options.names(free),
+            shadowing=shadowing,
+            form=options.form(form),
+            mask=(zeros(), blocked_detector(blocked)) if blocked else (zeros(),),
+            n_rays=n_rays,
+            realizations=realizations,
+            seed=seed,
+            workers=workers,
+            progress=bars.update,
+        )
+        inputs = {
+            "surface": surface.name,
+            "scan": scan.name,
+            "index": f"{n:g} + {kappa:g} i",
+            "fitted": free,
+        }
+        begin = perf_counter()
+        write_report(result, stage, inputs=inputs, seconds={"reading": reading})
+        writing = perf_counter() - begin
+    for line in summary(result):
+        typer.echo(line)
+    total = reading + sum(result.seconds.values()) + writing
+    stages = {"reading": reading, **result.seconds, "report": writing, "in all": total}
+    typer.echo("\nSeconds: " + ", ".join(f"{name} {s:.1f}" for name, s in stages.items()))
+    typer.echo(f"Report:  {target / 'report.html'}")
+
+
+def summary(result: "PipelineResult") -> Iterator[str]:
+    """Yield what a reader at the terminal wants to know."""
+    from fitting.report import fit_columns
+
+    yield "Surface"
+    for name, (estimate, unit) in result.statistics.estimates().items():
+        if name in ("height_rms", "corr_length", "slope_rms", "noise_rms"):
+            yield f"  {name:<16} {estimate} {'' if unit == '1' else unit}".rstrip()
+    for title, fit in fit_columns(result).items():
+        yield title
+        for name, estimate in fit.estimates.items():
+            yield f"  {name:<16} {estimate}"
+        if not fit.n_estimated:
+            yield f"  {'chi2 / dof':<16} {fit.chi2 / fit.dof:.3g}"
+    if result.unknown:
+        yield "What these data cannot tell"
+        for text in result.unknown:
+            yield f"  - {text}"

@@ -1,0 +1,107 @@
+"""Read what a user calls a surface: a profile, a map or a micrograph."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pbrdf.cli.options import Kind
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from data_io import Profile
+    from pbrdf.surface.heightmap import HeightMap
+
+__all__ = ["read_scan", "read_surface"]
+
+_IMAGES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
+_TEXT = {".csv", ".txt", ".asc", ".dat", ".tsv", ".xyz"}
+_MARKS = "#%;/"
+
+
+def read_surface(
+    path: Path,
+    *,
+    kind: Kind = Kind.auto,
+    um_per_pixel: float | None = None,
+    spacing: float | None = None,
+    unit: str | None = None,
+) -> "Profile | HeightMap":
+    """Read a surface file as what it is, or as what the user says it is.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, or an option does not belong to its kind.
+    """
+    import data_io
+
+    kind = _kind(path) if kind is Kind.auto else kind
+    unused = {
+        "--um-per-pixel": um_per_pixel is not None and kind is not Kind.image,
+        "--spacing-um": spacing is not None and kind is not Kind.map,
+        "--unit": unit is not None and kind is Kind.image,
+    }
+    for option, wrong in unused.items():
+        if wrong:
+            msg = f"{option} does not belong to a {kind}, got {path.name}. Leave it out."
+            raise ValueError(msg)
+    if kind is Kind.image:
+        if um_per_pixel is None:
+            msg = f"{path.name} is a picture and has no scale. Give --um-per-pixel."
+            raise ValueError(msg)
+        return data_io.read_profile_image(path, um_per_pixel=um_per_pixel)
+    if kind is Kind.profile:
+        return data_io.read_profile(path, unit=unit)
+    return data_io.read_height_map(path, spacing=spacing, unit=unit)
+
+
+def read_scan(path: Path, *, wavelength: float | None = None) -> "xr.Dataset":
+    """Read a goniometer file, or those of its rows that have a wavelength [um].
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, or has no such rows.
+    """
+    import numpy as np
+
+    import data_io
+
+    scan = data_io.read_goniometer(path)
+    if wavelength is None:
+        return scan
+    if "wavelength" not in scan.coords:
+        msg = (
+            f"--wavelength-um must occur in the scan, {path.name} names none. Leave it out."
+        )
+        raise ValueError(msg)
+    waves = np.broadcast_to(scan.wavelength.values, scan.sizes["geometry"])
+    here = np.isclose(waves, wavelength, rtol=1e-6)
+    if not here.any():
+        known = ", ".join(f"{wave:g}" for wave in np.unique(waves))
+        msg = f"--wavelength-um must be one of {known} of {path.name}, got {wavelength:g}."
+        raise ValueError(msg)
+    return scan.isel(geometry=np.flatnonzero(here))
+
+
+def _kind(path: Path) -> Kind:
+    """Tell the kind from the name; text with two columns is a profile, with more a map."""
+    suffix = path.suffix.lower()
+    if suffix in _IMAGES:
+        return Kind.image
+    if suffix not in _TEXT or suffix == ".xyz":
+        return Kind.map
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in file:
+            words = line.replace(",", " ").replace(";", " ").split()
+            if words and words[0][0] not in _MARKS and _is_number(words[0]):
+                return Kind.profile if len(words) <= 2 else Kind.map
+    return Kind.profile
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
