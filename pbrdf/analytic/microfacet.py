@@ -150,7 +150,9 @@ class MicrofacetModel:
         pair = self.slope_rms
         slope_x, slope_y = pair if isinstance(pair, tuple) else (pair, pair)
         return kernel.Surface(
-            Roughness(law, slope_x, slope_y, slope_norm(law, slope_x, slope_y)),
+            Roughness(
+                law, slope_x, slope_y, slope_x == slope_y, slope_norm(law, slope_x, slope_y)
+            ),
             Shadowing(SHADOWING[self.shadowing].code, self.shadow_omega, self.shadow_tau),
             float(self.specular_gain),
             float(self.diffuse_albedo),

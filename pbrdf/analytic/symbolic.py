@@ -116,12 +116,15 @@ def brdf_expression(
     slope_x, slope_y = given["slope_rms_x"], given["slope_rms_y"]
     norm = rebind(slopes.slope_norm, operations, copies)(law, slope_x, slope_y)
     surface = microfacet.Surface(
-        slopes.Roughness(law, slope_x, slope_y, norm),
+        slopes.Roughness(law, slope_x, slope_y, slope_x is slope_y, norm),
         Shadowing(rule, given["shadow_omega"], given["shadow_tau"]),
         given["specular_gain"],
         given["diffuse_albedo"],
     )
-    way = rebind(facet.directions, operations, copies)(theta_i, theta_s, dphi, phi_i)
+    cos_phi, sin_phi = operations["cos"](phi_i), operations["sin"](phi_i)
+    way = rebind(facet.directions, operations, copies)(
+        theta_i, theta_s, dphi, cos_phi, sin_phi
+    )
     evaluate = rebind(microfacet.microfacet_brdf, operations, copies)
     rows = evaluate(way, given["n"], given["kappa"], surface)
     return ca.vertcat(*(ca.horzcat(*row) for row in rows))

@@ -12,6 +12,7 @@ from pbrdf.optics.mueller import (
     dolp,
     is_physical,
 )
+from pbrdf.optics.read_table import material_from_csv
 
 __all__ = [
     "CONVENTIONS",
@@ -29,6 +30,7 @@ __all__ = [
     "dolp",
     "fresnel_amplitudes",
     "is_physical",
+    "material_from_csv",
     "specular_mueller",
     "transmission_mueller",
 ]
