@@ -9,6 +9,7 @@ from data_io.micrograph import (
     read_profile_images,
     write_profile_overlay,
 )
+from data_io.mitsuba import export_mitsuba
 from data_io.model import read_model, write_model
 from data_io.profile import MissingUnitWarning, Profile, read_profile
 from data_io.results import read_result, write_result
@@ -18,6 +19,7 @@ __all__ = [
     "MicrographWarning",
     "MissingUnitWarning",
     "Profile",
+    "export_mitsuba",
     "in_plane",
     "read_goniometer",
     "read_height_map",

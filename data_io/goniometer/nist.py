@@ -29,6 +29,7 @@ from pathlib import Path
 
 import numpy as np
 
+from data_io._frames import rotation
 from data_io._text import Line, is_comment, read_numbers
 from data_io.goniometer.scan import ELEMENTS, Scan
 from pbrdf.errors import DataFileError
@@ -92,19 +93,11 @@ def _to_conventions(
     """Return Mueller BRDFs, shape (n, 4, 4), from f_r11 and normalised elements. [1/sr]"""
     mueller = elements.reshape(-1, 4, 4) * elements[:, :1, None]
     mueller[:, 0, 0] = elements[:, 0]
-    mueller = rotation(phi_s) @ mueller @ rotation(-phi_i)
+    into_meridian = rotation(np.cos(phi_s), np.sin(phi_s))
+    from_meridian = rotation(np.cos(phi_i), -np.sin(phi_i))
+    mueller = into_meridian @ mueller @ from_meridian
     left_to_right = np.array([1.0, 1.0, 1.0, -1.0])
     return mueller * np.outer(left_to_right, left_to_right)
-
-
-def rotation(angle: np.ndarray) -> np.ndarray:
-    """Return Mueller rotations into a frame turned by `angle` about the beam, (n, 4, 4)."""
-    cosine, sine = np.cos(2 * angle), np.sin(2 * angle)
-    matrix = np.zeros((angle.size, 4, 4))
-    matrix[:, 0, 0] = matrix[:, 3, 3] = 1.0
-    matrix[:, 1, 1] = matrix[:, 2, 2] = cosine
-    matrix[:, 1, 2], matrix[:, 2, 1] = sine, -sine
-    return matrix
 
 
 def _snap(zenith: np.ndarray) -> np.ndarray:
