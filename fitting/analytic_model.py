@@ -28,7 +28,7 @@ class AnalyticModel:
         True if slope_rms_x and slope_rms_y are to be told apart.
     """
 
-    second_order = True
+    first_order: frozenset[str] = frozenset()
 
     def __init__(self, model: "MicrofacetModel", *, split_slope: bool = False) -> None:
         self.model = model
@@ -40,8 +40,8 @@ class AnalyticModel:
         wavelength = geometry.wavelength if known.all() else None
         if self.model.material.dispersive and wavelength is None:
             msg = (
-                "measurement must hold the wavelength of every geometry where the material's "
-                "index depends on it, got none. Add wavelength_um or give n as a number."
+                "measurement must hold every wavelength where the material's index depends "
+                "on it, got none. Add wavelength_um or give n as a number."
             )
             raise ValueError(msg)
         n, kappa = self.model.material.indices(wavelength)
@@ -83,9 +83,9 @@ class AnalyticModel:
 
     def _slopes(self) -> dict[str, float]:
         slope = self.model.slope_rms
-        if not self._split:
-            return {"slope_rms": slope}
         x, y = slope if isinstance(slope, tuple) else (slope, slope)
+        if not self._split:
+            return {"slope_rms": x}
         return {"slope_rms_x": x, "slope_rms_y": y}
 
     def _numbers(self) -> dict[str, float]:

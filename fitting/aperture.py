@@ -1,9 +1,9 @@
 """Finite source and detector: a reading is an average over two cones, not a point.
 
-The average is taken with the seven-point rule on a disc, exact to degree five [1]_, weighted
-with the cosines that irradiance and collected flux carry. The instrument's polarisers stay
-with the axis of each cone while the meridian frames turn across it, near the zenith by any
-angle; the rotation between the two is part of the average.
+The average is taken with the seven-point rule on a disc, exact to degree five [1]_,
+weighted with the cosines that irradiance and collected flux carry. The instrument's
+polarisers stay with the axis of each cone while the meridian frames turn across it, near
+the zenith by any angle; the rotation between the two is part of the average.
 
 References
 ----------

@@ -6,7 +6,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from fitting.objective import Prediction, Objective
+from fitting.objective import Objective, Prediction
 from fitting.solution import Solution, better, early_end
 
 if TYPE_CHECKING:

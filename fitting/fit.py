@@ -8,7 +8,7 @@ import numpy as np
 
 from fitting.analytic_model import AnalyticModel
 from fitting.aperture import Aperture
-from fitting.forward import INSTRUMENT, Layout, MuellerModel
+from fitting.forward import INSTRUMENT, Layout, MuellerModel, predict
 from fitting.noise import Noise, Weights, weights_for
 from fitting.objective import Objective
 from fitting.observations import Geometry, Mask, Observations, observe
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from fitting.estimate import Estimate
 
 __all__ = ["fit"]
-
-Scans = "xr.Dataset | Sequence[xr.Dataset] | Mapping[str, xr.Dataset]"
 
 
 def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to make)
@@ -123,10 +121,11 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
         raise ValueError(msg)
     known = _known(priors)
     observations = _above_horizon(observe(_labelled(measurement), use=use, mask=mask))
-    adapter = _adapter(model, free, observations.geometry)
+    adapter = _adapter(model, free)
     held = {**(fixed or {}), **{n: v for n, (v, _) in known.items() if n not in free}}
     _check_names(adapter, observations.geometry, free, {**held, **known, **(bounds or {})})
     layout = Layout.of(tuple(free), observations, separate)
+    _check_separate(adapter, separate)
     parameters = _parameters(adapter, observations, layout, bounds or {}, known)
     uncertain = {n: stderr for n, (_, stderr) in known.items() if n not in free}
 
@@ -174,13 +173,12 @@ def _above_horizon(observations: Observations) -> Observations:
         )
         raise ValueError(msg)
     keep = lowest < np.pi / 2 - 1e-6
-    columns = {
-        key: getattr(observations, key)[keep] for key in ("name", "at", "value", "stderr")
-    }
-    return replace(observations, **columns)
+    columns = ("name", "at", "value", "stderr")
+    kept = {column: getattr(observations, column)[keep] for column in columns}
+    return replace(observations, **kept)
 
 
-def _adapter(model: Any, free: Sequence[str], geometry: Geometry) -> MuellerModel:
+def _adapter(model: Any, free: Sequence[str]) -> MuellerModel:
     """Return the model as the fit sees it."""
     if hasattr(model, "mueller") and hasattr(model, "values"):
         return model
@@ -221,6 +219,14 @@ def _check_names(
                 raise ValueError(msg)
 
 
+def _check_separate(model: MuellerModel, separate: Iterable[str]) -> None:
+    """Reject separate values of what is simulated once for all scans."""
+    for name in separate:
+        if name in model.first_order:
+            msg = f"separate must not name {name!r}, which this simulated model shares."
+            raise ValueError(msg)
+
+
 def _parameters(
     model: MuellerModel,
     observations: Observations,
@@ -233,7 +239,9 @@ def _parameters(
     parameters = []
     for index, (label, name) in enumerate(zip(layout.labels, layout.base, strict=True)):
         where = np.flatnonzero(layout.column[name] == index)
-        values = np.broadcast_to(present[name], layout.column[name].shape)[where]
+        values = np.broadcast_to(
+            np.asarray(present[name], dtype=float), layout.column[name].shape
+        )[where]
         # One n for several wavelengths starts from their middle
         start = float(np.median(values))
         if name in known:
@@ -247,7 +255,7 @@ def _parameters(
 
 
 def _off_bounds(parameter: Parameter) -> Parameter:
-    """Start inside: at kappa = 0 every derivative by kappa is zero, and nothing would move."""
+    """Start inside: at kappa = 0 every derivative by kappa is zero and nothing moves."""
     step = min(0.1 * parameter.scale, 0.25 * (parameter.high - parameter.low))
     return parameter.started_at(
         float(np.clip(parameter.value, parameter.low + step, parameter.high - step))
@@ -269,8 +277,6 @@ def _problem(  # noqa: PLR0913  (the parts of a problem)
     seed: int,
 ) -> Problem:
     """Put the problem together; its first weights take the readings for the curve."""
-    from fitting.forward import predict
-
     prediction = predict(model, observations, layout, fixed=fixed, aperture=aperture)
     start = np.array([parameter.value for parameter in parameters])
     stderr = _first_stderr(observations, weights, prediction.function(start).full().ravel())

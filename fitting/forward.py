@@ -24,8 +24,8 @@ class MuellerModel(Protocol):
     """What the fit needs of a reflectance model, analytical or simulated."""
 
     @property
-    def second_order(self) -> bool:
-        """False if the expression has first derivatives only."""
+    def first_order(self) -> frozenset[str]:
+        """Parameters by which only first derivatives exist; one value for all scans."""
 
     def values(self, geometry: Geometry) -> Mapping[str, np.ndarray]:
         """Return the present value of every parameter at each geometry, shape (N,)."""
@@ -168,7 +168,7 @@ def predict(
 
     y = _readings(observations, linear)
     function = casadi.Function("reading", [x], [y])
-    return Prediction(function, second_order=model.second_order)
+    return Prediction(function, second_order=not model.first_order & set(layout.base))
 
 
 def _readings(observations: Observations, linear: Any) -> Any:

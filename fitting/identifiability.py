@@ -49,8 +49,8 @@ def identifiability_warnings(
         width = parameter.high - parameter.low
         if np.isfinite(stderr) and 0.0 < width < np.inf and 4.0 * stderr > width:
             warnings.append(
-                f"{parameter.name} is hardly determined: its 95 % interval is as wide as its "
-                f"bounds [{parameter.low:g}, {parameter.high:g}]"
+                f"{parameter.name} is hardly determined: its 95 % interval is as wide as "
+                f"its bounds [{parameter.low:g}, {parameter.high:g}]"
             )
     if not problem.observations.has_polarisation:
         warnings.append(_unpolarised(problem, solved, found))
@@ -67,8 +67,8 @@ def misfit_warnings(problem: Problem, solved: Solved, p_value: float) -> list[st
     if p_value < 1e-3:
         warnings.append(
             f"chi2/dof is {ratio:.3g}: the model misses the data by more than their stated "
-            f"errors, and the standard errors do not include that; times {np.sqrt(ratio):.2g} "
-            "they would"
+            "errors, and the standard errors do not include that; times "
+            f"{np.sqrt(ratio):.2g} they would"
         )
     elif 1.0 - p_value < 1e-3:
         warnings.append(
@@ -94,8 +94,8 @@ def _at_bounds(problem: Problem, solved: Solved) -> list[str]:
         for bound in (parameter.low, parameter.high):
             if np.isfinite(bound) and abs(value - bound) <= 1e-9 * max(1.0, abs(bound)):
                 warnings.append(
-                    f"{parameter.name} stands at its bound {bound:g}; the data would take it "
-                    "further, or it is absent"
+                    f"{parameter.name} stands at its bound {bound:g}; the data would take "
+                    "it further, or it is absent"
                 )
     return warnings
 
@@ -117,7 +117,7 @@ def _worst(stderr: np.ndarray, involved: Sequence[int]) -> float:
 
 
 def _possible(observations: Observations) -> list[tuple[str, Observations]]:
-    """List what else could be read: other elements here, or all again at another incidence."""
+    """List what else could be read: other elements, or all at another incidence."""
     geometry = observations.geometry
     everywhere = np.unique(observations.at)
     extras = [
@@ -156,19 +156,32 @@ def _stderr_with(
     rows = covariance_rows(solved.objective, x)
     if extra is not None:
         more = problem.predict(extra).jacobian(x).full()
-        is_element = problem.observations.name != "DOLP"
-        known = solved.objective.stderr[is_element if is_element.any() else slice(None)]
-        more = more[np.isfinite(more).all(axis=1)]
-        rows = np.vstack([rows, more / np.median(known)])
+        more = more / _stderr_there(problem.observations, solved.objective.stderr, extra)
+        rows = np.vstack([rows, more[np.isfinite(more).all(axis=1)]])
     return information(rows).stderr
+
+
+def _stderr_there(
+    observations: Observations, stderr: np.ndarray, extra: Observations
+) -> np.ndarray:
+    """Return the errors of other readings, as good as those at the same place, (k, 1)."""
+    is_element = observations.name != "DOLP"
+    if not is_element.any():
+        is_element = ~is_element
+    at, known = observations.at[is_element], stderr[is_element]
+    size = observations.geometry.size
+    count = np.bincount(at, minlength=size)
+    total = np.bincount(at, known, minlength=size)
+    typical = np.where(count > 0, total / np.maximum(count, 1), np.median(known))
+    return np.asarray(typical[extra.at][:, None])
 
 
 def _unpolarised(problem: Problem, solved: Solved, found: Information) -> str:
     """Say what a scan of M00 alone leaves open, with the numbers."""
     text = (
-        "the scan is unpolarised (M00 only): the polarisation of the reflected light is not "
-        "tested, and specular and diffuse light are told apart only by the shape of M00, as "
-        "far as slope_rms, shadowing and index are right"
+        "the scan is unpolarised (M00 only): the polarisation of the reflected light is "
+        "not tested, and specular and diffuse light are told apart only by the shape of "
+        "M00, as far as slope_rms, shadowing and index are right"
     )
     at = np.unique(problem.observations.at)
     name = np.full(at.size, "M10")
@@ -186,7 +199,7 @@ def _unpolarised(problem: Problem, solved: Solved, found: Information) -> str:
 
 
 def _runs(observations: Observations, residual: np.ndarray) -> list[tuple[str, float, int]]:
-    """Return the lag-one correlation of the residuals of each observable along its scans."""
+    """Return the lag-one correlation of residuals along the scans, by observable."""
     geometry = observations.geometry
     view = geometry.theta_view[observations.at]
     incidence = geometry.theta_i[observations.at].round(6)

@@ -198,7 +198,8 @@ def _simplex(
     stage = _Stage(objective, x, np.diag(sizes))
     optimizer = _bounded(nlopt.LN_SBPLX, objective, x, sizes, limit)
     optimizer.set_initial_step(0.3)
-    optimizer.set_xtol_rel(1e-5)
+    # SLSQP finds the digits
+    optimizer.set_xtol_rel(1e-3)
     stage.run(optimizer)
     counts[0] += stage.count
     return stage.best_x

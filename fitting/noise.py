@@ -124,7 +124,7 @@ def weights_for(observations: Observations, noise: Noise | str | None) -> list[W
 def _instrument(
     observations: Observations, noise: Noise
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """Standard errors of readings under an instrument noise; a ratio has it relative."""
+    """Return the standard errors under an instrument noise; a ratio has it relative."""
     is_ratio = observations.name == "DOLP"
 
     def shape(m00: np.ndarray) -> np.ndarray:
@@ -144,7 +144,7 @@ def _mixed(
 
 
 def _groups(observations: Observations, known: np.ndarray) -> np.ndarray:
-    """Number the observables without standard errors; the rare ones share the first number."""
+    """Return a number for each observable without standard errors; rare ones share one."""
     group = np.full(len(observations.value), -1)
     number = 0
     for name in observations.names:
@@ -159,17 +159,18 @@ def _groups(observations: Observations, known: np.ndarray) -> np.ndarray:
 
 
 def _of_file(observations: Observations) -> Weights:
-    """Take the standard errors of the file, re-read where they are a part of the readings."""
+    """Take the standard errors of the file, or the percentage of M00 that they are."""
     nobody = np.full(len(observations.value), -1)
     m00 = np.full(observations.geometry.size, np.nan)
     is_m00 = observations.name == "M00"
     m00[observations.at[is_m00]] = np.abs(observations.value[is_m00])
-    ratio = observations.stderr / m00[observations.at]
+    with np.errstate(divide="ignore"):
+        ratio = observations.stderr / m00[observations.at]
     part = np.full(len(ratio), np.nan)
     for name in observations.names:
         members = observations.name == name
         seen = ratio[members]
-        # One number to the digits of a file: a percentage of the reading, not an error of it
+        # One number to the digits of a file: a percentage of the reading
         if (
             len(seen) >= _ENOUGH
             and np.isfinite(seen).all()

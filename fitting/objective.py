@@ -24,7 +24,7 @@ from fitting.parameters import Parameter
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["LOSSES", "Prediction", "Objective"]
+__all__ = ["LOSSES", "Objective", "Prediction"]
 
 
 def _linear(z: Any) -> Any:

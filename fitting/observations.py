@@ -116,8 +116,8 @@ def observe(
     use : sequence of str, optional
         Observables to use; default all that the scans hold.
     mask : callable or iterable of callables
-        Each returns, for a scan, what to keep: a boolean array over `geometry`, or a Dataset
-        of them for single observables.
+        Each returns, for a scan, what to keep: a boolean array over `geometry`, or a
+        Dataset of them for single observables.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def _flatten(
     """Flatten one scan."""
     geometry = _geometry(label, scan)
     known = [*LINEAR, "DOLP"]
-    # DOLP follows from M00 and M10 where they are given: counting it too is using them twice
+    # DOLP follows from M00 and M10 where they are given: it must not count again
     derived = {"DOLP"} if {"M00", "M10"} <= set(scan.data_vars) else set()
     names = [name for name in known if name in scan and name not in derived]
     if use is not None:
@@ -178,8 +178,8 @@ def _flatten(
         value = np.asarray(scan[name].values, dtype=float)
         good = np.isfinite(value)
         for kept in keep:
-            if not hasattr(kept, "data_vars"):
-                good = good & np.asarray(kept, dtype=bool)
+            if isinstance(kept, np.ndarray):
+                good = good & kept.astype(bool)
             elif name in kept:
                 good = good & np.asarray(kept[name].values, dtype=bool)
         columns.append((name, np.flatnonzero(good), value[good], _stderr(scan, name, good)))
@@ -223,8 +223,8 @@ def _geometry(label: str, scan: "xr.Dataset") -> Geometry:
     if "geometry" not in scan.dims or missing:
         lacks = ", ".join(missing) or "geometry"
         msg = (
-            f"measurement {label} must have the dimension geometry with theta_i, theta_s and "
-            f"dphi [rad], got none of {lacks}. Use data_io.read_goniometer."
+            f"measurement {label} must have the dimension geometry with theta_i, theta_s "
+            f"and dphi [rad], got none of {lacks}. Use data_io.read_goniometer."
         )
         raise ValueError(msg)
     size = scan.sizes["geometry"]

@@ -149,6 +149,10 @@ class Problem:
         solution = replace(solution, n_evaluations=count, cost=objective.cost(solution.x))
         return Solved(solution, objective, _log_likelihood(objective, solution.x))
 
+    def minimise(self, *, begin: np.ndarray) -> Solution:
+        """Fit once from `begin`, with the standard errors of the readings as they are."""
+        return self._minimise(self.objective.started_at(begin), None)
+
     def _minimise(self, objective: Objective, search: str | None) -> Solution:
         """Run the solver from each start and keep the lowest end."""
         solve = SOLVERS[self.solver]

@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+
 import numpy as np
 from scipy import stats
 
 from fitting.forward import INSTRUMENT, Layout
 from fitting.identifiability import identifiability_warnings, misfit_warnings
+from fitting.objective import Objective
 from fitting.problem import Problem, Solved, covariance_rows
 from fitting.result import FitResult
 from fitting.uncertainty import (
@@ -40,7 +42,8 @@ def result_of(
     chi2, dof = float((residual**2).sum()), m - n
 
     nothing = np.full((n, n), np.nan)
-    covariance, parts, warnings = nothing, {}, []
+    covariance, warnings = nothing, []
+    parts: dict[str, dict[str, float]] = {}
     if not solution.converged:
         warnings.append(f"no minimum was found ({solution.status}); do not use the values")
     elif dof <= 0 and problem.weights.n_estimated:
@@ -84,10 +87,10 @@ def result_of(
     )
 
 
-def _robust(objective: object, x: np.ndarray, found: Information) -> Information:
+def _robust(objective: Objective, x: np.ndarray, found: Information) -> Information:
     """Return the information with the covariance of the robust estimate."""
-    slope, bend = objective.influence(x)  # type: ignore[attr-defined]
-    covariance = sandwich(objective.jacobian(x), slope, bend, found)  # type: ignore[attr-defined]
+    slope, bend = objective.influence(x)
+    covariance = sandwich(objective.jacobian(x), slope, bend, found)
     return replace(found, covariance=covariance)
 
 

@@ -85,7 +85,7 @@ class FitResult:
 
     @cached_property
     def readings(self) -> "xr.Dataset":
-        """Every reading beside its fitted value, its stderr and geometry, dim `reading`."""
+        """Every reading beside its fitted value, stderr and geometry, dim `reading`."""
         import xarray as xr
 
         observations, objective = self.problem.observations, self.problem.objective
@@ -141,7 +141,7 @@ class FitResult:
 
     @property
     def p_value(self) -> float:
-        """Chance of a chi2 this high if the model is right; nan where it was made to fit."""
+        """Chance of a chi2 this high if the model is right; nan if it was made to fit."""
         if self.n_estimated or self.dof <= 0:
             return np.nan
         return float(stats.chi2.sf(self.chi2, self.dof))

@@ -11,7 +11,7 @@ from pathlib import Path
 import casadi
 import numpy as np
 
-from fitting.objective import Prediction, Objective
+from fitting.objective import Objective, Prediction
 from fitting.parameters import Parameter
 
 FOLDER = Path(__file__).parent / "nist_strd"

@@ -9,7 +9,7 @@ from scipy import optimize
 from fitting.casadi_solver import solve_casadi
 from fitting.global_search import SEARCHES, starts
 from fitting.nlopt_solver import solve_nlopt
-from fitting.objective import LOSSES, Prediction, Objective
+from fitting.objective import LOSSES, Objective, Prediction
 from fitting.parameters import Parameter, bounded_parameter
 from fitting.uncertainty import information
 
@@ -59,7 +59,11 @@ def test_losses_equal_their_textbook_functions(loss):
     parameters = [Parameter(name="x", value=0.4)]
     base = linear_objective(np.ones((3, 1)), data, parameters)
     objective = Objective(
-        prediction=base.prediction, data=data, stderr=base.stderr, parameters=parameters, loss=loss
+        prediction=base.prediction,
+        data=data,
+        stderr=base.stderr,
+        parameters=parameters,
+        loss=loss,
     )
     z = (0.4 - data) ** 2
     k, c = 1.345, 2.385
