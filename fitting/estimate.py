@@ -7,6 +7,8 @@ import numpy as np
 from scipy import special
 
 LEVEL = 0.95
+# An rms from less than this many independent values is anyone's guess
+_LEAST_FREEDOM = 0.5
 _NORMAL = float(special.ndtri(0.5 + LEVEL / 2))
 
 
@@ -82,9 +84,12 @@ class Estimate:
         value : float
             The rms.
         log_variance : float
-            Variance of the logarithm of its square, 2 / (degrees of freedom).
+            Variance of the logarithm of its square, 2 / (degrees of freedom). Above 4 the
+            value counts as not determined.
         """
         freedom = 2 / max(log_variance, 1e-12)
+        if freedom < _LEAST_FREEDOM:
+            return cls.undetermined(value)
         low, high = (
             value * np.sqrt(freedom / special.chdtri(freedom, tail))
             for tail in (0.5 - LEVEL / 2, 0.5 + LEVEL / 2)

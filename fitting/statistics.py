@@ -115,7 +115,7 @@ def surface_statistics(
         return _profile_statistics(surface, degree, _form_name(degree), quantisation)
     msg = (
         f"surface must be a Profile (x, z) or a HeightMap (heights, spacing), "
-        f"got {type(surface).__name__}. See data_io.read_profile and data_io.read_height_map."
+        f"got {type(surface).__name__}. See data_io.read_profile and read_height_map."
     )
     raise TypeError(msg)
 
@@ -124,7 +124,7 @@ def _profile_statistics(
     profile: ProfileLike, degree: int, form: str, quantisation: float | None
 ) -> SurfaceStatistics:
     x, z = np.asarray(profile.x, dtype=float), np.asarray(profile.z, dtype=float)
-    known = np.isfinite(z)
+    known = ~np.isnan(z)
     x, z = x[known], z[known]
     _check_heights(z, degree)
     residual, removed = remove_form_profile(x, z, degree)
@@ -149,7 +149,7 @@ def _map_statistics(
     heights = np.asarray(surface.heights, dtype=float)
     dx, dy = np.broadcast_to(np.asarray(surface.spacing, dtype=float), (2,))
     spacing = (float(dx), float(dy))
-    _check_heights(heights[np.isfinite(heights)], degree)
+    _check_heights(heights[~np.isnan(heights)], degree)
     residual, removed = remove_form_map(heights, spacing, degree)
     lines = (residual.T, residual)
     samplings = [line_sampling(lines[i], spacing[i]) for i in (0, 1)]
@@ -163,8 +163,8 @@ def _map_statistics(
     axes = []
     for i, name in enumerate("xy"):
         other, length = first[1 - i].correlation, samplings[1 - i].length
-        across = mean_power_of_correlation(other.rho, other.corr_length, length, 2)
-        losses = form_losses(other.rho, other.corr_length, length, degree)
+        across = mean_power_of_correlation(other, length, 2)
+        losses = form_losses(other, length, degree)
         axes.append(axis_statistics(name, data[i], across, losses))
     return _assemble("map", tuple(axes), residual, spacing, form=form, step=step)
 
@@ -195,9 +195,7 @@ def _independent(axes: tuple[AxisStatistics, ...]) -> _Counts:
     share = [1.0, 1.0]
     for axis in axes:
         for i, power in enumerate((3, 4)):
-            share[i] *= mean_power_of_correlation(
-                axis.fit.correlation.rho, axis.corr_length.value, axis.length, power
-            )
+            share[i] *= mean_power_of_correlation(axis.fit.correlation, axis.length, power)
     return _Counts(1 / share[0], 1 / share[1])
 
 
@@ -226,7 +224,7 @@ def _assemble(
         anisotropy = measure_anisotropy(
             residual,
             (spacing[0], spacing[1]),
-            min(a.corr_length.value for a in axes) / 3,
+            min(a.corr_length.value for a in axes) / 5,
             noise.value**2 + step**2 / 12,
         )
     findings = Findings(

@@ -4,14 +4,13 @@ import numpy as np
 
 from fitting.estimate import Estimate
 from fitting.statistics_fit import AxisData, AxisFit, fit_axis
-from fitting.statistics_models import GAUSSIAN
 from fitting.statistics_result import Autocorrelation, AxisStatistics
 from fitting.statistics_spectrum import measured_cutoff
 
 Array = np.ndarray
 
-# Fits whose misfit exceeds this describe no more than their shortest lags
-_HOPELESS = 60.0
+# Forms whose slope depends on the shortest wavelength that is counted
+JAGGED = ("matern", "multi-scale")
 
 
 def axis_statistics(
@@ -31,13 +30,9 @@ def axis_statistics(
         Shares of variance that the form takes across the axis, for a map.
     """
     fit = fit_axis(data, across=across, losses_across=losses)
-    inflation, form = 1.0, fit.correlation.form
-    if fit.misfit > _HOPELESS:
-        # No form describes the whole curve; near lag 0 every smooth one is alike
-        form, inflation = "other", fit.misfit / fit.increments.lags.size
-        fit = fit_axis(
-            data, across=across, losses_across=losses, families=(GAUSSIAN,), reach=0.5
-        )
+    # Beyond chance, what the form does not describe widens the intervals
+    freedom = max(fit.increments.lags.size - fit.parameters.size, 1)
+    inflation = max(1.0, fit.misfit / freedom)
     sampling = data.sampling
     disturbance = fit.noise + data.step**2 / 12
     cutoff = measured_cutoff(
@@ -47,18 +42,17 @@ def axis_statistics(
         fit.correlation.corr_length,
     )
     # A smooth form has a slope of its own; a jagged one only down to a wavelength
-    band = cutoff if fit.correlation.form == "matern" else 0.0
+    band = cutoff if fit.correlation.form in JAGGED else 0.0
     length_variance = fit.log_variance(lambda t: fit.correlation_at(t).corr_length)
-    corr_length = fit.correlation.corr_length
-    if form == "other":
-        corr_length = _measured_fall(fit, data)
     return AxisStatistics(
         axis=name,
-        corr_length=Estimate.positive(corr_length, inflation * length_variance),
+        corr_length=Estimate.positive(
+            fit.correlation.corr_length, inflation * length_variance
+        ),
         slope_rms=_derivative_rms(fit, band, 1, inflation),
         curvature_rms=_derivative_rms(fit, band, 2, inflation),
         cutoff=cutoff,
-        autocorrelation=_describe(form, fit, data),
+        autocorrelation=_describe(fit, data),
         spacing=float(sampling.spacing),
         length=float(sampling.length),
         plain_corr_length=float(sampling.first_fall()),
@@ -79,37 +73,22 @@ def _derivative_rms(
     )
 
 
-def _measured_fall(fit: AxisFit, data: AxisData) -> float:
-    """Lag where the measured autocorrelation, cleared of noise, falls to 1/e. [um]"""
-    true = max(fit.mean_square - fit.noise - data.step**2 / 12, 1e-3 * fit.mean_square)
-    found = data.sampling.increments(data.sampling.longest_lag, 200)
-    rho = 1 - (found.mean_square - 2 * (fit.noise + data.step**2 / 12)) / (2 * true)
-    below = np.flatnonzero(rho < np.exp(-1))
-    if below.size == 0:
-        return data.sampling.longest_lag
-    i = int(below[0])
-    if i == 0:
-        return float(found.lags[0])
-    share = (rho[i - 1] - np.exp(-1)) / (rho[i - 1] - rho[i])
-    return float(found.lags[i - 1] + share * (found.lags[i] - found.lags[i - 1]))
-
-
-def _describe(form: str, fit: AxisFit, data: AxisData) -> Autocorrelation:
+def _describe(fit: AxisFit, data: AxisData) -> Autocorrelation:
     correlation = fit.correlation
     found = data.sampling.increments(3 * correlation.corr_length, 40)
     measured = 1 - (found.mean_square / 2 - fit.noise - data.step**2 / 12) / fit.variance
     texts = {
         "gaussian": "Gaussian, exp(-r²/l²)",
+        "periodic": "periodic over {period:.3g} um, in step for {coherence_length:.3g} um",
         "two-scale": "two Gaussian scales, {long_length:.3g} um and {short_length:.3g} um "
         "with {short_share:.2g} of the variance",
-        "matern": "Matérn of smoothness {smoothness:.2g} (0.5: exponential, large: Gaussian)",
-        "other": "none of Gaussian, Matérn and two-scale",
+        "matern": "Matérn of smoothness {smoothness:.2g} (exponential: 0.5)",
+        "multi-scale": "many Gaussian scales, {short_length:.3g} to {long_length:.3g} um",
     }
-    parameters = {} if form == "other" else correlation.parameters
     return Autocorrelation(
-        form=form,
-        description=texts[form].format(**parameters),
-        parameters=parameters,
+        form=correlation.form,
+        description=texts[correlation.form].format(**correlation.parameters),
+        parameters=correlation.parameters,
         lag=np.concatenate([[0.0], found.lags]),
         measured=np.concatenate([[1.0], measured]),
         fitted=correlation.rho(np.concatenate([[0.0], found.lags])),
@@ -145,4 +124,4 @@ def _height_log_variance(fit: AxisFit, square: float, loss: float) -> float:
             / 2e-4
         )
     gradient = gradient + loss / (1 - loss) * by_length @ fit.response
-    return float(gradient @ fit.covariance @ gradient)
+    return max(float(gradient @ fit.covariance @ gradient), 1e-12)

@@ -7,17 +7,24 @@ structure function: the exact optimum would put its trust in the last digits of 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import optimize
 
 from fitting.statistics_lags import Increments, Sampling
-from fitting.statistics_models import FAMILIES, GAUSSIAN, Correlation, Family
+from fitting.statistics_models import (
+    FAMILIES,
+    GAUSSIAN,
+    Correlation,
+    Family,
+    multi_scale_family,
+)
 from fitting.statistics_quantisation import Rounding
 from fitting.statistics_variance import (
     Extent,
     form_losses,
+    form_scatter,
     increment_covariance,
 )
 
@@ -26,6 +33,13 @@ Array = np.ndarray
 # Lags reach this many correlation lengths: beyond, the structure function is a plateau
 REACH = 1.5
 N_LAGS = 14
+# A sum of scales needs lags over all of them
+_WIDE_REACH = 2.0
+_WIDE_LAGS = 24
+# Misfit above which no simple form describes the curve
+_HOPELESS = 60.0
+# What a sum of scales need not describe better, as a share of each increment
+_TOLERANCE = 0.01
 # Share of each standard deviation added to the diagonal of the covariance
 _SOFTENING = 0.3
 # Drop of the misfit, in chi-squared units, that a form with more parameters must bring
@@ -108,7 +122,8 @@ class AxisFit:
         """Variance of ln(quantity(parameters) · mean_square^direct), to first order."""
         gradient = _gradient(lambda t: np.log(quantity(t)), self.parameters) @ self.response
         gradient[0] += direct / self.mean_square
-        return float(gradient @ self.covariance @ gradient)
+        # First order in large scatter may cancel; no quantity is known to 1e-6
+        return max(float(gradient @ self.covariance @ gradient), 1e-12)
 
     def correlation_at(self, parameters: Array) -> Correlation:
         """Autocorrelation for another parameter vector."""
@@ -118,7 +133,7 @@ class AxisFit:
     def noise_stderr(self) -> float:
         """Standard error of the noise variance. [um²]"""
         row = self.response[-1]
-        return float(np.sqrt(row @ self.covariance @ row)) * self.mean_square
+        return float(np.sqrt(max(row @ self.covariance @ row, 0.0))) * self.mean_square
 
 
 def fit_axis(
@@ -127,7 +142,6 @@ def fit_axis(
     across: float = 1.0,
     families: Sequence[Family] = FAMILIES,
     losses_across: Array | None = None,
-    reach: float = REACH,
 ) -> AxisFit:
     """Fit each family and keep the simplest that the data do not reject.
 
@@ -141,10 +155,8 @@ def fit_axis(
         Candidates; the first is preferred unless another fits clearly better.
     losses_across : ndarray, optional
         Shares that the form's terms take across the axis, for a map.
-    reach : float
-        Longest lag, in correlation lengths.
     """
-    problem = _Problem(data, across, losses_across, reach)
+    problem = _Problem(data, across, losses_across)
     best = problem.solve(families[0], problem.pilot())
     for family in families[1:]:
         # No form can drop the misfit by more than all of it
@@ -154,7 +166,11 @@ def fit_axis(
         extra = len(family.starts(1.0)[0]) - len(best.family.starts(1.0)[0])
         if best.misfit - other.misfit > _DROP_PER_PARAMETER * max(extra, 0.2):
             best = other
-    return best if best.family is families[0] else problem.solve(best.family, best)
+    if best.family is not families[0]:
+        best = problem.solve(best.family, best)
+    if best.misfit > _HOPELESS and len(families) > 1:
+        best = problem.sum_of_scales(best)
+    return best
 
 
 @dataclass
@@ -170,11 +186,9 @@ class _Start:
 class _Problem:
     """One axis: model of the data, its weights, and the solver."""
 
-    def __init__(
-        self, data: AxisData, across: float, losses_across: Array | None, reach: float
-    ) -> None:
+    def __init__(self, data: AxisData, across: float, losses_across: Array | None) -> None:
         self.data = data
-        self.reach = reach
+        self.reach, self.n_lags, self.tolerance = REACH, N_LAGS, 0.0
         sampling = data.sampling
         self.mean_square = sampling.variance
         self.extent = Extent(sampling.length, sampling.n_points, across)
@@ -211,18 +225,46 @@ class _Problem:
         fit = self._minimise(family, reference, None)
         return fit
 
+    def sum_of_scales(self, reference: AxisFit) -> AxisFit:
+        """Describe the curve by as many Gaussian scales as it takes."""
+        self.reach, self.n_lags, self.tolerance = _WIDE_REACH, _WIDE_LAGS, _TOLERANCE
+        length = min(self.data.sampling.first_fall(), self.extent.length / 4)
+        at = _Start(
+            reference.family, reference.correlation, reference.variance, reference.noise
+        )
+        scale = length / at.correlation.corr_length
+        stretched = at.correlation.stretched(scale)
+        at = _Start(reference.family, stretched, at.variance, at.noise)
+        self._set_weights(at)
+        lags = self.found.lags
+        lengths = np.geomspace(2 * self.data.sampling.spacing, 4 * length, 24)
+        curves = 2 * (1 - np.exp(-((lags[:, None] / lengths) ** 2)))
+        columns = np.vstack([np.ones(lengths.size), curves])
+        noise = np.concatenate([[1.0], np.full(lags.size, 2.0)])
+        observed = np.concatenate([[self.mean_square], self.found.mean_square])
+        # Rounding is small beside such data; Sheppard's correction makes the problem linear
+        observed = observed - self.rounding.variance * noise
+        system = self.factor @ np.column_stack([columns, noise])
+        weights = optimize.nnls(system, self.factor @ observed)[0]
+        used = weights[:-1] > 1e-4 * weights[:-1].sum()
+        lengths, shares = lengths[used], weights[:-1][used]
+        family = multi_scale_family(lengths, shares / shares.sum())
+        start = _Start(
+            family, family.build(np.array(family.starts(1.0)[0])), shares.sum(), weights[-1]
+        )
+        return self._with_errors(self._minimise(family, start, None))
+
     def _set_weights(self, at: "_Start | AxisFit") -> None:
         data, correlation = self.data, at.correlation
         length = float(np.clip(correlation.corr_length, 0, self.extent.length / 3))
-        self.found = data.sampling.increments(self.reach * length, N_LAGS)
+        self.found = data.sampling.increments(self.reach * length, self.n_lags)
         lags = self.found.lags
         self.rounding = Rounding.of_form(
             data.step, data.form_increments(lags) if data.step > 0 else np.zeros((1, 0))
         )
         covariance = increment_covariance(
             lags,
-            correlation.rho,
-            length,
+            correlation,
             (at.variance, at.noise + self.rounding.variance),
             self.extent,
         )
@@ -230,6 +272,13 @@ class _Problem:
         gain = np.concatenate([[1.0], self.rounding.gain(true)])
         # Rounding noise is white in the covariance, so its own gain is in there already
         self.covariance = covariance * np.outer(gain, gain) if data.step > 0 else covariance
+        observed = np.concatenate([[self.mean_square], self.found.mean_square])
+        # An error of the form is common to neighbouring lags, as a stretch of the curve is
+        apart = np.log(np.concatenate([[self.reach * length], lags]))
+        alike = np.exp(-2 * (apart[:, None] - apart) ** 2)
+        self.covariance = self.covariance + alike * self.tolerance**2 * np.outer(
+            observed, observed
+        )
         softened = self.covariance + np.diag(_SOFTENING**2 * np.diag(self.covariance))
         self.factor = np.linalg.cholesky(np.linalg.inv(softened)).T
 
@@ -246,9 +295,7 @@ class _Problem:
 
     def loss(self, correlation: Correlation) -> float:
         """Share of the height variance that form removal takes, in expectation."""
-        along = form_losses(
-            correlation.rho, correlation.corr_length, self.extent.length, self.data.degree
-        )
+        along = form_losses(correlation, self.extent.length, self.data.degree)
         if self.losses_across is None:
             return float(min(along.sum(), 0.9))
         across = self.losses_across
@@ -303,7 +350,19 @@ class _Problem:
             lambda t: self.model(fit.family, t), fit.parameters
         )
         response = np.linalg.pinv(jacobian, rcond=1e-9) @ self.factor
-        return AxisFit(**{**fit.__dict__, "response": response})
+        return replace(fit, response=response, covariance=self._projected(fit))
+
+    def _projected(self, fit: AxisFit) -> Array:
+        """Covariance of the data without what the removed form took of the mean square."""
+        covariance = self.covariance.copy()
+        if self.losses_across is None:
+            share = form_scatter(
+                fit.correlation,
+                self.extent.length,
+                self.data.degree,
+            )
+            covariance[0, 0] *= 1 - share
+        return covariance
 
 
 def _jacobian(function: Callable[[Array], Array], at: Array) -> Array:

@@ -70,10 +70,14 @@ def _instrument(found: Findings) -> list[str]:
             f"measured, {found.slope.value:.3g} corrected"
         )
     for axis in found.axes:
-        if axis.cutoff > max(2.02 * axis.spacing, axis.corr_length.value):
+        fit = axis.fit
+        whole = axis.slope_rms.value**2
+        seen = fit.variance * fit.correlation.band_variance(axis.cutoff)
+        if seen < 0.9 * whole:
             texts.append(
                 f"along {axis.axis} noise hides wavelengths below {axis.cutoff:.3g} um; "
-                "finer roughness, if any, is not in slope_rms"
+                f"{1 - seen / whole:.0%} of the slope variance rests on the "
+                f"{axis.autocorrelation.form} form alone"
             )
     return texts
 
@@ -82,7 +86,7 @@ def _resolution(found: Findings) -> list[str]:
     texts = []
     for axis in found.axes:
         length = axis.fit.correlation.shortest_length()
-        if axis.autocorrelation.form in ("matern", "other"):
+        if axis.autocorrelation.form in ("matern", "multi-scale"):
             texts.append(
                 f"along {axis.axis} the autocorrelation is not Gaussian "
                 f"({axis.autocorrelation.description}): slope_rms is that of wavelengths "

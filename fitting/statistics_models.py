@@ -1,8 +1,9 @@
-"""Forms of the autocorrelation of heights: Gaussian, Matérn, two Gaussian scales.
+"""Forms of the autocorrelation of heights: Gaussian, periodic, Matérn, several scales.
 
 Each is normalised, ρ(0) = 1. The Gaussian is the paper's. Matérn runs from surfaces as
 jagged as an exponential autocorrelation (smoothness ν = 1/2, no slope at all without a
-cut-off) to the Gaussian (ν → ∞). Two Gaussian scales describe fine roughness on coarse.
+cut-off) to the Gaussian (ν → ∞). Two Gaussian scales describe fine roughness on coarse;
+many describe what has no simple form. The periodic form is that of machined grooves.
 """
 
 from collections.abc import Callable
@@ -23,7 +24,7 @@ class Correlation:
     Parameters
     ----------
     form : str
-        ``gaussian``, ``matern`` or ``two-scale``.
+        ``gaussian``, ``periodic``, ``matern``, ``two-scale`` or ``multi-scale``.
     corr_length : float
         Lag at which the autocorrelation is 1/e. [um]
     parameters : mapping
@@ -63,14 +64,45 @@ class Correlation:
             return np.inf
         # Substituting f = e^t spreads the decades of a multi-scale surface evenly
         top = np.log(1 / cutoff) if cutoff > 0 else np.log(1e4 / self.shortest_length())
-        t = np.linspace(np.log(1e-4 / self.corr_length), top, 2001)
+        t = np.linspace(np.log(1e-4 / self.corr_length), top, 4001)
         f = np.exp(t)
         integrand = 2 * (2 * np.pi * f) ** (2 * derivative) * self.spectrum(f) * f
         return float(integrate.simpson(integrand, x=t))
 
+    def stretched(self, factor: float) -> "Correlation":
+        """Return the same form with all lengths multiplied by `factor`."""
+        return Correlation(
+            self.form,
+            self.corr_length * factor,
+            {
+                k: v * factor if k.endswith("length") else v
+                for k, v in self.parameters.items()
+            },
+            lambda r: self.rho(r / factor),
+            lambda f: self.spectrum(f * factor) * factor,
+        )
+
+    def longest_length(self) -> float:
+        """Lag beyond which nothing is correlated, a few times over. [um]"""
+        names = ("long_length", "coherence_length")
+        return max(self.corr_length, *(self.parameters.get(n, 0.0) for n in names))
+
     def shortest_length(self) -> float:
         """Shortest length in the description. [um]"""
         return min(self.corr_length, self.parameters.get("short_length", np.inf))
+
+
+@dataclass(frozen=True)
+class Family:
+    """How a form is parametrised for the fit: logarithms, with start and limits.
+
+    `build` takes the parameter vector, `start` and `limits` a first guess of corr_length.
+    """
+
+    form: str
+    build: Callable[[Array], Correlation]
+    starts: Callable[[float], list[list[float]]]
+    limits: Callable[[float], tuple[list[float], list[float]]]
 
 
 def gaussian(corr_length: float) -> Correlation:
@@ -94,7 +126,7 @@ def gaussian(corr_length: float) -> Correlation:
 def matern(corr_length: float, smoothness: float) -> Correlation:
     """Matérn form with its 1/e length and smoothness ν; ν = 1/2 is exp(-r/l).
 
-    Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs (4.14), (4.15).
+    Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, (4.14), (4.15).
     """
     nu = smoothness
     kappa = _matern_unit_length(nu) / corr_length
@@ -111,6 +143,24 @@ def matern(corr_length: float, smoothness: float) -> Correlation:
             - (nu + 0.5) * np.log(kappa**2 + (2 * np.pi * f) ** 2)
         ),
     )
+
+
+def periodic(period: float, coherence: float) -> Correlation:
+    """ρ(r) = exp(-r²/c²) cos(2πr/P): grooves of period P that keep step over a length c."""
+    wave = 2 * np.pi / period
+
+    def rho(r: Array) -> Array:
+        return np.exp(-((r / coherence) ** 2)) * np.cos(wave * r)
+
+    def spectrum(f: Array) -> Array:
+        lobes = [np.exp(-((np.pi * coherence * (f + s / period)) ** 2)) for s in (-1, 1)]
+        return np.sqrt(np.pi) * coherence / 2 * np.sum(lobes, axis=0)
+
+    # Below a quarter period both factors fall
+    top = min(period / 4, coherence)
+    corr_length = optimize.brentq(lambda r: float(rho(np.array(r))) - np.exp(-1), 0.0, top)
+    parameters = {"period": period, "coherence_length": coherence}
+    return Correlation("periodic", float(corr_length), parameters, rho, spectrum)
 
 
 def two_scale(long_length: float, short_length: float, short_share: float) -> Correlation:
@@ -140,6 +190,45 @@ def two_scale(long_length: float, short_length: float, short_share: float) -> Co
     return Correlation("two-scale", corr_length, parameters, rho, spectrum)
 
 
+def multi_scale(lengths: Array, shares: Array) -> Correlation:
+    """Sum of Gaussian scales; `shares` of the height variance, lengths rising. [um]"""
+    squares = np.asarray(lengths) ** 2
+
+    def rho(r: Array) -> Array:
+        return np.tensordot(shares, np.exp(-np.multiply.outer(1 / squares, r**2)), 1)
+
+    def spectrum(f: Array) -> Array:
+        waves = np.exp(-np.multiply.outer(np.pi**2 * squares, f**2))
+        return np.tensordot(shares * np.sqrt(np.pi * squares), waves, 1)
+
+    corr_length = float(
+        optimize.brentq(
+            lambda r: float(rho(np.array(r))) - np.exp(-1),
+            0.99 * lengths[0],
+            1.01 * lengths[-1],
+        )
+    )
+    slopes = shares / squares
+    parameters = {
+        "short_length": float(lengths[0]),
+        "long_length": float(lengths[-1]),
+        "short_slope_share": float(slopes[0] / slopes.sum()),
+    }
+    return Correlation("multi-scale", corr_length, parameters, rho, spectrum)
+
+
+def multi_scale_family(lengths: Array, shares: Array) -> Family:
+    """Make a family of the shares of fixed lengths, by their log-ratios to the first."""
+    start = np.log(shares[1:] / shares[0]).tolist()
+
+    def build(p: Array) -> Correlation:
+        weights = np.exp(np.concatenate([[0.0], p]))
+        return multi_scale(lengths, weights / weights.sum())
+
+    limits = ([v - 5 for v in start], [v + 5 for v in start])
+    return Family("multi-scale", build, lambda _: [start], lambda _: limits)
+
+
 def _matern_unit(x: Array, nu: float) -> Array:
     """2^(1-ν)/Γ(ν) x^ν K_ν(x), 1 at x = 0."""
     x = np.maximum(np.asarray(x, dtype=float), 1e-10)
@@ -151,19 +240,6 @@ def _matern_unit(x: Array, nu: float) -> Array:
 def _matern_unit_length(nu: float) -> float:
     """Argument at which the unit Matérn function is 1/e."""
     return float(optimize.brentq(lambda x: _matern_unit(x, nu) - np.exp(-1), 1e-8, 30.0))
-
-
-@dataclass(frozen=True)
-class Family:
-    """How a form is parametrised for the fit: logarithms, with start and limits.
-
-    `build` takes the parameter vector, `start` and `limits` a first guess of corr_length.
-    """
-
-    form: str
-    build: Callable[[Array], Correlation]
-    starts: Callable[[float], list[list[float]]]
-    limits: Callable[[float], tuple[list[float], list[float]]]
 
 
 GAUSSIAN = Family(
@@ -183,6 +259,17 @@ MATERN = Family(
     ),
 )
 
+PERIODIC = Family(
+    "periodic",
+    lambda p: periodic(np.exp(p[0]), np.exp(p[1])),
+    # cos falls to 1/e at 0.19 periods
+    lambda length: [[np.log(5.25 * length), np.log(k * length)] for k in (3.0, 15.0)],
+    lambda length: (
+        [np.log(2 * length), np.log(0.7 * length)],
+        [np.log(100 * length), np.log(60 * length)],
+    ),
+)
+
 TWO_SCALE = Family(
     "two-scale",
     # Long length, ratio of the lengths, logit of the share
@@ -194,4 +281,4 @@ TWO_SCALE = Family(
     ),
 )
 
-FAMILIES = (GAUSSIAN, MATERN, TWO_SCALE)
+FAMILIES = (GAUSSIAN, PERIODIC, MATERN, TWO_SCALE)

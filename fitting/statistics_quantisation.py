@@ -22,6 +22,8 @@ import numpy as np
 Array = np.ndarray
 
 N_HARMONICS = 200
+# A lattice shows in this many heights as well as in all of a large map
+_MOST_HEIGHTS = 200_000
 # Steps this far below the rms increment change nothing that is printed
 _NEGLIGIBLE = 0.02
 
@@ -39,9 +41,9 @@ def find_step(heights: Array) -> float:
     >>> round(find_step(0.3 * np.array([1, 4, 2, 2, 3, 5, 1, 2, 7, 1, 3, 2]) + 0.05), 9)
     0.3
     """
-    sample = heights[np.isfinite(heights)].ravel()
-    if sample.size > 200_000:
-        sample = sample[:: sample.size // 200_000]
+    sample = heights.ravel()
+    sample = sample[:: max(1, sample.size // _MOST_HEIGHTS)]
+    sample = sample[np.isfinite(sample)]
     levels = np.unique(sample)
     if levels.size < 2 or levels.size > sample.size / 2:
         return 0.0

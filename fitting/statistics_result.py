@@ -23,12 +23,15 @@ class Autocorrelation:
     Parameters
     ----------
     form : str
-        ``gaussian``, ``matern``, ``two-scale``, or ``other`` where none of them fits.
+        ``gaussian``, ``periodic``, ``matern``, ``two-scale``, or ``multi-scale`` where none
+        of them fits.
     description : str
         The same in words.
     parameters : dict
-        Of the form: ``smoothness`` (Matérn; 0.5 is exponential), or ``long_length``,
-        ``short_length`` [um] and ``short_share`` (two-scale).
+        Of the form: ``period``, ``coherence_length`` [um] (periodic), ``smoothness``
+        (Matérn; 0.5 is exponential), or ``long_length``,
+        ``short_length`` [um] and ``short_share`` of the variance (two-scale) or
+        ``short_slope_share`` of the slope variance (multi-scale).
     lag, measured, fitted : ndarray
         Autocorrelation against lag [um], noise and rounding taken off; 1 at lag 0.
     """

@@ -56,16 +56,22 @@ def measure_anisotropy(
     noise : float
         Variance of white noise and rounding on each height. [um²]
     """
-    steps = tuple(
-        int(np.clip(round(lag / d), 1, n // 8 or 1))
-        for d, n in zip(spacing, heights.shape, strict=True)
+    near, far = (
+        [
+            max(1, min(round(stretch * lag / d), n // 16))
+            for d, n in zip(spacing, heights.shape, strict=True)
+        ]
+        for stretch in (1, 2)
     )
-    a, b = steps[0] * spacing[0], steps[1] * spacing[1]
-    blocks = [
-        _tensor(part, steps, (a, b), noise)
-        for rows in np.array_split(heights, _BLOCKS, axis=0)
-        for part in np.array_split(rows, _BLOCKS, axis=1)
-    ]
+    lags = np.array(near) * spacing
+    blocks = []
+    for rows in np.array_split(heights, _BLOCKS, axis=0):
+        for part in np.array_split(rows, _BLOCKS, axis=1):
+            tensor = _tensor(part, near, spacing, noise)
+            if far == [2 * i for i in near]:
+                # What differences over a distance lack of the slope grows as its square
+                tensor = (4 * tensor - _tensor(part, far, spacing, noise)) / 3
+            blocks.append(tensor)
     tensors = np.array([t for t in blocks if np.isfinite(t).all()])
     if len(tensors) < 4:
         return Anisotropy(
@@ -97,7 +103,7 @@ def measure_anisotropy(
     ends = [_ratio(np.clip(size + k * radial, 0, 0.999999)) for k in (0, -1.96, 1.96)]
     stderr = (ends[2] - ends[1]) / (2 * 1.96)
     ratio = Estimate(ends[0], stderr, ends[1] if p_value < 0.05 else 1.0, ends[2])
-    return Anisotropy(ratio, direction, p_value, float(np.sqrt(a * b)))
+    return Anisotropy(ratio, direction, p_value, float(np.sqrt(np.prod(lags))))
 
 
 def _ratio(size: float) -> float:
@@ -111,14 +117,14 @@ def _p_value(deviator: Array, scatter: Array, n: int) -> float:
 
 
 def _tensor(
-    part: Array, steps: tuple[int, ...], lags: tuple[float, float], noise: float
+    part: Array, steps: list[int], spacing: tuple[float, float], noise: float
 ) -> Array:
     """Mean squares and product of slopes (xx, yy, xy) of one block. [1]"""
     i, j = steps
     nx, ny = part.shape
     if nx <= i + 1 or ny <= j + 1:
         return np.full(3, np.nan)
-    a, b = lags
+    a, b = i * spacing[0], j * spacing[1]
     xx = _mean_square(part[i:] - part[:-i])
     yy = _mean_square(part[:, j:] - part[:, :-j])
     # D(a, b) - D(a, -b) = 4 a b <z_x z_y>; white noise drops out of the difference

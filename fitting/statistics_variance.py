@@ -10,15 +10,16 @@ where G is the covariance between an increment of lag j and one of lag k that st
 later.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import legendre
 from scipy import linalg
 
+from fitting.statistics_models import Correlation
+
 Array = np.ndarray
-Correlogram = Callable[[Array], Array]
 
 # Nodes a correlation length in the integrals over the separation m
 _NODES = 12
@@ -46,8 +47,7 @@ class Extent:
 
 def increment_covariance(
     lags: Array,
-    rho: Correlogram,
-    corr_length: float,
+    correlation: Correlation,
     variances: tuple[float, float],
     extent: Extent,
 ) -> Array:
@@ -57,10 +57,8 @@ def increment_covariance(
     ----------
     lags : ndarray, shape (n,)
         [um]
-    rho : callable
-        Autocorrelation of the true heights.
-    corr_length : float
-        Its 1/e length. [um]
+    correlation : Correlation
+        Of the true heights.
     variances : (float, float)
         Of the heights and of white noise on each of them. [um²]
     extent : Extent
@@ -72,8 +70,9 @@ def increment_covariance(
         [um⁴]
     """
     height, noise = variances
-    step = corr_length / _NODES
-    reach = min(5 * corr_length + lags[-1], extent.length)
+    rho = correlation.rho
+    step = correlation.corr_length / _NODES
+    reach = min(5 * correlation.longest_length() + lags[-1], extent.length)
     m = np.arange(-np.ceil(reach / step), np.ceil(reach / step) + 1) * step
     weight = np.clip(1 - np.abs(m) / extent.length, 0, None)
     weight *= 2 * step / extent.length * extent.across
@@ -90,14 +89,15 @@ def increment_covariance(
     result[0, 0] = np.sum(weight * at_m**2)
     result[0, 1:] = result[1:, 0] = rise**2 @ weight
     result[1:, 1:] = np.einsum("jkm,jkm,m->jk", between, between, weight)
-    return result + _noise_covariance(lags, rho, (height, noise), extent.n_points)
+    return result + _noise_covariance(lags, correlation, (height, noise), extent.n_points)
 
 
 def _noise_covariance(
-    lags: Array, rho: Correlogram, variances: tuple[float, float], n_points: int
+    lags: Array, correlation: Correlation, variances: tuple[float, float], n_points: int
 ) -> Array:
     """Part of the covariance that white noise adds, alone and times the heights."""
     height, noise = variances
+    rho = correlation.rho
     drop = height * (1 - rho(lags))
     apart = height * (1 - rho(np.abs(lags[:, None] - lags)))
     # Signal increments at the separations where their noises coincide: m = j - k, j, -k, 0
@@ -111,24 +111,28 @@ def _noise_covariance(
     return result / n_points
 
 
-def mean_power_of_correlation(
-    rho: Correlogram, corr_length: float, length: float, power: int
-) -> float:
+def mean_power_of_correlation(correlation: Correlation, length: float, power: int) -> float:
     r"""(2/L) ∫₀ᴸ (1 - r/L) ρ(r)ᵖ dr, at most 1."""
-    r = np.linspace(0, min(length, 12 * corr_length), 1200)
-    value = 2 / length * np.trapezoid((1 - r / length) * rho(r) ** power, r)
+    reach = min(length, 8 * correlation.longest_length())
+    r = np.linspace(
+        0, reach, int(np.clip(30 * reach / correlation.corr_length, 400, 20_000))
+    )
+    rho = correlation.rho(r)
+    # Odd powers of grooves would cancel and claim more pieces than there are
+    raised = rho if power == 1 else np.abs(rho) ** power
+    value = 2 / length * np.trapezoid((1 - r / length) * raised, r)
     return float(min(value, 1.0))
 
 
-def form_losses(rho: Correlogram, corr_length: float, length: float, degree: int) -> Array:
+def form_losses(correlation: Correlation, length: float, degree: int) -> Array:
     """Share of the height variance that a fitted Legendre term of each degree takes away.
 
     Parameters
     ----------
-    rho : callable
-        Autocorrelation.
-    corr_length, length : float
-        1/e length and length of the profile. [um]
+    correlation : Correlation
+        Of the heights.
+    length : float
+        Of the profile. [um]
     degree : int
         Highest degree of the form.
 
@@ -139,13 +143,44 @@ def form_losses(rho: Correlogram, corr_length: float, length: float, degree: int
     """
     if degree < 0:
         return np.zeros(0)
-    n = int(np.clip(5 * length / corr_length, 64, 400))
-    x = (np.arange(n) + 0.5) / n
-    if length > 80 * corr_length:
+    if length > 80 * correlation.longest_length():
         # Far longer than the correlation every smooth term takes the same: S(0) / L
-        share = mean_power_of_correlation(rho, corr_length, length, 1)
+        share = mean_power_of_correlation(correlation, length, 1)
         return np.full(degree + 1, share)
-    basis = legendre.legvander(2 * x - 1, degree)
-    terms = np.linalg.qr(basis)[0]
-    taken = linalg.matmul_toeplitz(rho(x * length - x[0] * length), terms)
-    return np.asarray(np.sum(terms * taken, axis=0) / n)
+    n = _nodes(correlation, length)
+    # Expected square of the projection on a unit vector t: sum of C(i - j) t_i t_j
+    return np.asarray(
+        _term_correlation(degree, n) @ correlation.rho(np.arange(n) * (length / n)) / n
+    )
+
+
+def form_scatter(correlation: Correlation, length: float, degree: int) -> float:
+    """Share of the variance of the mean square height that goes with the removed form.
+
+    With P the projection on the form, tr(CC) - tr((1 - P) C (1 - P) C) over tr(CC).
+    """
+    if degree < 0 or length > 80 * correlation.longest_length():
+        return 0.0
+    n = _nodes(correlation, length)
+    x = (np.arange(n) + 0.5) / n
+    terms = np.linalg.qr(legendre.legvander(2 * x - 1, degree))[0]
+    covariance = linalg.toeplitz(correlation.rho((x - x[0]) * length))
+    blurred = covariance @ terms
+    removed = 2 * np.sum(blurred**2) - np.sum((terms.T @ blurred) ** 2)
+    return float(removed / np.sum(covariance**2))
+
+
+def _nodes(correlation: Correlation, length: float) -> int:
+    """Nodes that resolve the correlation over a profile; few values, for the cache."""
+    wanted = 5 * length / correlation.corr_length
+    return next((n for n in (128, 400) if n >= wanted), 800)
+
+
+@lru_cache(maxsize=32)
+def _term_correlation(degree: int, n: int) -> Array:
+    """Correlation of each orthonormal term with itself at 0 .. n - 1 steps, both signs."""
+    x = (np.arange(n) + 0.5) / n
+    terms = np.linalg.qr(legendre.legvander(2 * x - 1, degree))[0].T
+    both = np.array([2 * np.correlate(t, t, "full")[n - 1 :] for t in terms])
+    both[:, 0] /= 2
+    return both
