@@ -26,6 +26,7 @@ __all__ = [
     "reflection_elements",
     "select",
     "transmission_elements",
+    "transmission_parts",
     "wave_normal",
 ]
 
@@ -135,6 +136,36 @@ def reflection_amplitudes(cos_beta, n, kappa):
 
 
 @jit
+def transmitted_powers(cos_beta, n, kappa):
+    """Return T_s = 4 c Re(q)/|c + q|^2 and T_p = T_s (|q|^2 + s^2)/|s^2 + q c|^2.
+
+    The identity behind T_p is r_p of the module's head; neither is a difference.
+    """
+    q_re, q_im = wave_normal(cos_beta, n, kappa)
+    sin2_beta = (1.0 - cos_beta) * (1.0 + cos_beta)
+    forward = cos_beta + q_re
+    trans_s = 4.0 * cos_beta * q_re / (forward * forward + q_im * q_im + TINY)
+    bend_re = sin2_beta + q_re * cos_beta
+    bend_im = q_im * cos_beta
+    bend2 = bend_re * bend_re + bend_im * bend_im + TINY
+    trans_p = trans_s * (q_re * q_re + q_im * q_im + sin2_beta) / bend2
+    return trans_s, trans_p
+
+
+@jit
+def transmission_parts(cos_beta, n, kappa):
+    """(T_s + T_p)/2, (T_s - T_p)/2 and sqrt(T_s T_p), without a branch; 0 behind a mirror."""
+    perfect = n == inf
+    trans_s, trans_p = transmitted_powers(cos_beta, select(perfect, 1.0, n), kappa)
+    open_part = select(perfect, 0.0, 1.0)
+    return (
+        open_part * 0.5 * (trans_s + trans_p),
+        open_part * 0.5 * (trans_s - trans_p),
+        open_part * sqrt(trans_s * trans_p),
+    )
+
+
+@jit
 def transmission_elements(cos_beta, n, kappa):
     """Elements A, B, C, D of the power that crosses: T_s = 1 - R_s, T_p = 1 - R_p.
 
@@ -144,18 +175,9 @@ def transmission_elements(cos_beta, n, kappa):
     """
     if n == inf:
         return 0.0, 0.0, 0.0, 0.0
+    trans_s, trans_p = transmitted_powers(cos_beta, n, kappa)
     q_re, q_im = wave_normal(cos_beta, n, kappa)
-    q = complex(q_re, q_im)
-    sin2_beta = (1.0 - cos_beta) * (1.0 + cos_beta)
-
-    # T_s = 4 c Re(q)/|c + q|^2 and T_p/T_s = |N|^2-weighted, both free of differences
-    forward = cos_beta + q
-    bend = sin2_beta + q * cos_beta
-    bend2 = bend.real * bend.real + bend.imag * bend.imag
-    norm = forward.real * forward.real + forward.imag * forward.imag
-    trans_s = 4.0 * cos_beta * q_re / (norm + TINY)
-    q_abs2 = q_re * q_re + q_im * q_im
-    trans_p = trans_s * (q_abs2 + sin2_beta) / (bend2 + TINY)
+    bend = (1.0 - cos_beta) * (1.0 + cos_beta) + complex(q_re, q_im) * cos_beta
 
     # t_p / t_s = N (c + q)/(N^2 c + q) = N / (s^2 + q c)
     ratio = complex(n, kappa) / (bend + TINY)

@@ -1,18 +1,19 @@
 """The Mueller BRDF of a rough surface made of Fresnel facets, equation (20)."""
 
 from collections import namedtuple
-from math import cos, pi, sin
+from math import cos, sin
 
 from . import jit
 from .facet import directions, mirror_facet, rotated_elements
 from .fresnel import facet_elements
 from .shadowing import shadowing_factor
 from .slopes import slope_density
+from .volume import added_elements, base_radiance
 
 __all__ = ["Surface", "fill_brdf", "microfacet_brdf", "specular_elements"]
 
-# rough, shadow: the namedtuples of their modules; gain, diffuse: factors of the terms
-Surface = namedtuple("Surface", "rough shadow specular_gain diffuse_albedo")
+# rough, shadow, diffuse: the namedtuples of their modules
+Surface = namedtuple("Surface", "rough shadow specular_gain diffuse")
 
 
 @jit
@@ -37,12 +38,16 @@ def specular_elements(way, n, kappa, surface):
 
 
 @jit
-def microfacet_brdf(way, n, kappa, surface):
-    """Rows of the Mueller BRDF of equation (24). [1/sr]"""
+def microfacet_brdf(way, n, kappa, surface, radiance):
+    """Rows of the Mueller BRDF of equation (24); radiance from `base_radiance`. [1/sr]"""
     first, second, third, fourth = specular_elements(way, n, kappa, surface)
-    # Unpolarised light adds to element (0, 0) only
-    total = first[0] + surface.diffuse_albedo / pi
-    return (total, first[1], first[2], first[3]), second, third, fourth
+    m00, m01, m10, m11, m22 = added_elements(way, n, kappa, surface.diffuse, radiance)
+    return (
+        (first[0] + m00, first[1] + m01, first[2], first[3]),
+        (second[0] + m10, second[1] + m11, second[2], second[3]),
+        (third[0], third[1], third[2] + m22, third[3]),
+        (fourth[0], fourth[1], fourth[2], fourth[3] + m22),
+    )
 
 
 @jit
@@ -51,12 +56,15 @@ def fill_brdf(theta_i, theta_s, dphi, phi_i, n, kappa, surface, out):
     each_phi = 1 if phi_i.size > 1 else 0
     each_index = 1 if n.size > 1 else 0
     cos_phi, sin_phi = cos(phi_i[0]), sin(phi_i[0])
+    radiance = base_radiance(n[0], kappa[0], surface.diffuse)
     for k in range(theta_i.size):
         if each_phi:
             cos_phi, sin_phi = cos(phi_i[k]), sin(phi_i[k])
         way = directions(theta_i[k], theta_s[k], dphi[k], cos_phi, sin_phi)
         m = k * each_index
-        rows = microfacet_brdf(way, n[m], kappa[m], surface)
+        if each_index:
+            radiance = base_radiance(n[m], kappa[m], surface.diffuse)
+        rows = microfacet_brdf(way, n[m], kappa[m], surface, radiance)
         for i in range(4):
             for j in range(4):
                 out[k, i, j] = rows[i][j]

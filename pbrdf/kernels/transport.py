@@ -91,7 +91,7 @@ def follow_path(
     """Follow a ray from its first meeting with the surface until it leaves for good.
 
     `fate` says what became of it so far: HIT on the facet given, or what `walk` returned.
-    Fills `cos_beta` (bounces) and `turn` (bounces + 1, 2). Returns the count to which the path
+    Fills column 0 of `cos_beta` (bounces, 1) and `turn` (bounces + 1, 1, 2). Returns the count to which the path
     belongs, the number of bounces and the exit direction.
     """
     # The beam travels against dir_i; its frame has e_s horizontal
@@ -107,9 +107,9 @@ def follow_path(
         k_x, k_y, k_z, s_x, s_y, s_z, leave_rate, cosine, c2, s2 = bounce(
             k_x, k_y, k_z, s_x, s_y, s_z, step_x / pitch_x, step_y / pitch_y
         )
-        cos_beta[bounces] = cosine
-        turn[bounces, 0] = c2
-        turn[bounces, 1] = s2
+        cos_beta[bounces, 0] = cosine
+        turn[bounces, 0, 0] = c2
+        turn[bounces, 0, 1] = s2
         bounces += 1
         fate, i, j, facet, u, v, z = walk(
             heights, maxima, levels, z_top, periodic,
@@ -117,8 +117,8 @@ def follow_path(
         )  # fmt: skip
 
     c2, s2 = exit_turn(k_x, k_y, k_z, s_x, s_y, s_z, cos_phi, sin_phi)
-    turn[bounces, 0] = c2
-    turn[bounces, 1] = s2
+    turn[bounces, 0, 0] = c2
+    turn[bounces, 0, 1] = s2
     count = N_LEAKED
     if fate == HIT:
         count = N_TRUNCATED
@@ -145,8 +145,8 @@ def trace_batch(
     energy          (wavelengths, 3), by what took it: ABSORBED, TRUNCATED, LEAKED, added to
     counts          rays by fate, path segments and self hits (6,), added to
     """
-    cos_beta = np.empty(max_bounces)
-    turn = np.empty((max_bounces + 1, 2))
+    cos_beta = np.empty((max_bounces, 1))
+    turn = np.empty((max_bounces + 1, 1, 2))
     mueller = np.zeros((4, 4))
     zenith, azimuth = bin_edges(brdf.shape[2], brdf.shape[3])
     for line in range(n_lines):
@@ -172,7 +172,7 @@ def trace_batch(
                 max_bounces, cos_beta, turn,
             )  # fmt: skip
             tally_path(
-                count, cos_beta, turn, bounces, k_x, k_y, k_z, cos_phi, sin_phi,
+                count, 1, 0, bounces, cos_beta, turn, k_x, k_y, k_z, cos_phi, sin_phi,
                 n, kappa, n_stokes, zenith, azimuth, mueller, brdf, energy, counts,
             )  # fmt: skip
 
@@ -191,8 +191,8 @@ def sweep_batch(
     the surface thus serves all rays of the line in their order.
     """
     nx, ny = heights.shape
-    cos_beta = np.empty(max_bounces)
-    turn = np.empty((max_bounces + 1, 2))
+    cos_beta = np.empty((max_bounces, 1))
+    turn = np.empty((max_bounces + 1, 1, 2))
     mueller = np.zeros((4, 4))
     zenith, azimuth = bin_edges(brdf.shape[2], brdf.shape[3])
     for line in range(n_lines):
@@ -255,7 +255,7 @@ def sweep_batch(
                             max_bounces, cos_beta, turn,
                         )  # fmt: skip
                         tally_path(
-                            count, cos_beta, turn, bounces, k_x, k_y, k_z, cos_phi, sin_phi,
+                            count, 1, 0, bounces, cos_beta, turn, k_x, k_y, k_z, cos_phi, sin_phi,
                             n, kappa, n_stokes, zenith, azimuth, mueller, brdf, energy, counts,
                         )  # fmt: skip
                         ray += 1

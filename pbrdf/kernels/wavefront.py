@@ -44,18 +44,17 @@ def enter_rays(
         y = wrap_into(start_y + speed_y * s, launch[1], launch[3])
         i = min(int(x), nx - 1)
         j = min(int(y), ny - 1)
-        place = state[k]
-        place[U] = x - i
-        place[V] = y - j
-        place[Z] = z_top
-        place[COS_PHI] = cos_phi
-        place[SIN_PHI] = sin_phi
-        place[KX] = -sin_theta_i * place[COS_PHI]
-        place[KY] = -sin_theta_i * place[SIN_PHI]
-        place[KZ] = -cos_theta_i
-        place[SX] = place[SIN_PHI]
-        place[SY] = -place[COS_PHI]
-        place[SZ] = 0.0
+        state[k, U] = x - i
+        state[k, V] = y - j
+        state[k, Z] = z_top
+        state[k, COS_PHI] = cos_phi
+        state[k, SIN_PHI] = sin_phi
+        state[k, KX] = -sin_theta_i * state[k, COS_PHI]
+        state[k, KY] = -sin_theta_i * state[k, SIN_PHI]
+        state[k, KZ] = -cos_theta_i
+        state[k, SX] = state[k, SIN_PHI]
+        state[k, SY] = -state[k, COS_PHI]
+        state[k, SZ] = 0.0
         cell[k, CELL_I] = i
         cell[k, CELL_J] = j
         cell[k, FACET] = -1
@@ -72,12 +71,11 @@ def emit_rays(
     """Write the active rays as Embree takes them: centred, in units of a cell, float32."""
     for a in range(active.shape[0]):
         k = active[a]
-        place = state[k]
         i = cell[k, CELL_I]
         j = cell[k, CELL_J]
-        x = (i + place[U] - center_x) * pitch_x / unit
-        y = (j + place[V] - center_y) * pitch_y / unit
-        z = (place[Z] - center_z) / unit
+        x = (i + state[k, U] - center_x) * pitch_x / unit
+        y = (j + state[k, V] - center_y) * pitch_y / unit
+        z = (state[k, Z] - center_z) / unit
         facet = cell[k, FACET]
         if facet >= 0:
             # Lift the ray off its facet along the normal
@@ -91,13 +89,13 @@ def emit_rays(
         origins[a, 0] = x
         origins[a, 1] = y
         origins[a, 2] = z
-        directions[a, 0] = place[KX]
-        directions[a, 1] = place[KY]
-        directions[a, 2] = place[KZ]
+        directions[a, 0] = state[k, KX]
+        directions[a, 1] = state[k, KY]
+        directions[a, 2] = state[k, KZ]
 
 
 @jit
-def arrive_on_facet(heights, periodic, pitch_x, pitch_y, i, j, facet, place, column, row):
+def arrive_on_facet(heights, periodic, pitch_x, pitch_y, i, j, facet, k, state, column, row):
     """Place (u, v, z) where a ray from cell (i, j) meets a facet of the cell (column, row).
 
     The cell is given without wrapping, so that it lies where the ray arrives.
@@ -106,13 +104,13 @@ def arrive_on_facet(heights, periodic, pitch_x, pitch_y, i, j, facet, place, col
     ci = column % nx if periodic else column
     cj = row % ny if periodic else row
     step_x, step_y = facet_gradient(heights, ci, cj, facet, periodic)
-    speed_x = place[KX] / pitch_x
-    speed_y = place[KY] / pitch_y
+    speed_x = state[k, KX] / pitch_x
+    speed_y = state[k, KY] / pitch_y
     # Clearance above the facet's plane, and how fast it shrinks
-    u = i + place[U] - column
-    v = j + place[V] - row
-    clear = place[Z] - (heights[ci, cj] + step_x * u + step_y * v)
-    rate = place[KZ] - step_x * speed_x - step_y * speed_y
+    u = i + state[k, U] - column
+    v = j + state[k, V] - row
+    clear = state[k, Z] - (heights[ci, cj] + step_x * u + step_y * v)
+    rate = state[k, KZ] - step_x * speed_x - step_y * speed_y
     t = 0.0
     if rate < 0.0:
         t = max(-clear / rate, 0.0)
@@ -123,15 +121,15 @@ def arrive_on_facet(heights, periodic, pitch_x, pitch_y, i, j, facet, place, col
 
 
 @jit
-def leave_domain(pitch_x, pitch_y, i, j, place, low_x, low_y, high_x, high_y):
+def leave_domain(pitch_x, pitch_y, i, j, k, state, low_x, low_y, high_x, high_y):
     """Time at which a ray that hits nothing leaves the rectangle of the mesh."""
     t = math.inf
-    x = i + place[U]
-    y = j + place[V]
-    if place[KX] != 0.0:
-        t = min(t, ((high_x if place[KX] > 0.0 else low_x) - x) * pitch_x / place[KX])
-    if place[KY] != 0.0:
-        t = min(t, ((high_y if place[KY] > 0.0 else low_y) - y) * pitch_y / place[KY])
+    x = i + state[k, U]
+    y = j + state[k, V]
+    if state[k, KX] != 0.0:
+        t = min(t, ((high_x if state[k, KX] > 0.0 else low_x) - x) * pitch_x / state[k, KX])
+    if state[k, KY] != 0.0:
+        t = min(t, ((high_y if state[k, KY] > 0.0 else low_y) - y) * pitch_y / state[k, KY])
     return max(t, 0.0)
 
 
@@ -144,7 +142,7 @@ def advance_rays(
     """Take the active rays through the answers of Embree, and tally those whose path ends.
 
     faces       face hit by each active ray, -1 for none
-    cos_beta, turn  records of the rays (chunk, bounces), (chunk, bounces + 1, 2)
+    cos_beta, turn  records of the rays (bounces, chunk), (bounces + 1, chunk, 2)
 
     Keeps the rays that travel on at the front of `active`, in their order, and returns their
     number.
@@ -155,7 +153,6 @@ def advance_rays(
     kept = 0
     for a in range(active.shape[0]):
         k = active[a]
-        place = state[k]
         bounces = cell[k, BOUNCES]
         end = -1
         face = faces[a]
@@ -170,32 +167,32 @@ def advance_rays(
             facet = face % 2
             i, j, u, v, z = arrive_on_facet(
                 heights, periodic, pitch_x, pitch_y,
-                cell[k, CELL_I], cell[k, CELL_J], facet, place, column, row,
+                cell[k, CELL_I], cell[k, CELL_J], facet, k, state, column, row,
             )  # fmt: skip
-            place[U] = u
-            place[V] = v
-            place[Z] = z
+            state[k, U] = u
+            state[k, V] = v
+            state[k, Z] = z
             cell[k, CELL_I] = i
             cell[k, CELL_J] = j
             cell[k, FACET] = facet
             cell[k, FACE] = 2 * ((i + guard_x) * mesh_ny + j + guard_y) + facet
             step_x, step_y = facet_gradient(heights, i, j, facet, periodic)
             (
-                place[KX], place[KY], place[KZ], place[SX], place[SY], place[SZ],
-                _, cos_beta[k, bounces], turn[k, bounces, 0], turn[k, bounces, 1],
+                state[k, KX], state[k, KY], state[k, KZ], state[k, SX], state[k, SY], state[k, SZ],
+                _, cos_beta[bounces, k], turn[bounces, k, 0], turn[bounces, k, 1],
             ) = bounce(
-                place[KX], place[KY], place[KZ], place[SX], place[SY], place[SZ],
+                state[k, KX], state[k, KY], state[k, KZ], state[k, SX], state[k, SY], state[k, SZ],
                 step_x / pitch_x, step_y / pitch_y,
             )  # fmt: skip
             cell[k, BOUNCES] = bounces + 1
         else:
             # Nothing was hit: the ray rises above the surface, or leaves the mesh below it
             t = leave_domain(
-                pitch_x, pitch_y, cell[k, CELL_I], cell[k, CELL_J], place,
+                pitch_x, pitch_y, cell[k, CELL_I], cell[k, CELL_J], k, state,
                 -guard_x, -guard_y, nx + guard_x, ny + guard_y,
             )  # fmt: skip
-            height = place[Z] + place[KZ] * t if place[KZ] != 0.0 else place[Z]
-            if place[KZ] > 0.0 and height >= z_top:
+            height = state[k, Z] + state[k, KZ] * t if state[k, KZ] != 0.0 else state[k, Z]
+            if state[k, KZ] > 0.0 and height >= z_top:
                 end = N_ESCAPED if bounces > 0 else N_LEAKED
             elif not periodic:
                 end = N_SIDE
@@ -203,26 +200,26 @@ def advance_rays(
                 end = N_LEAKED
             else:
                 # Onwards from the same place one period back
-                x = (cell[k, CELL_I] + place[U] + place[KX] * t / pitch_x) % nx
-                y = (cell[k, CELL_J] + place[V] + place[KY] * t / pitch_y) % ny
+                x = (cell[k, CELL_I] + state[k, U] + state[k, KX] * t / pitch_x) % nx
+                y = (cell[k, CELL_J] + state[k, V] + state[k, KY] * t / pitch_y) % ny
                 cell[k, CELL_I] = min(int(x), nx - 1)
                 cell[k, CELL_J] = min(int(y), ny - 1)
                 cell[k, FACET] = -1
                 cell[k, FACE] = -1
-                place[U] = x - cell[k, CELL_I]
-                place[V] = y - cell[k, CELL_J]
-                place[Z] = height
+                state[k, U] = x - cell[k, CELL_I]
+                state[k, V] = y - cell[k, CELL_J]
+                state[k, Z] = height
         if end < 0:
             active[kept] = k
             kept += 1
             continue
-        turn[k, bounces, 0], turn[k, bounces, 1] = exit_turn(
-            place[KX], place[KY], place[KZ], place[SX], place[SY], place[SZ],
-            place[COS_PHI], place[SIN_PHI],
+        turn[bounces, k, 0], turn[bounces, k, 1] = exit_turn(
+            state[k, KX], state[k, KY], state[k, KZ], state[k, SX], state[k, SY], state[k, SZ],
+            state[k, COS_PHI], state[k, SIN_PHI],
         )  # fmt: skip
         tally_path(
-            end, cos_beta[k], turn[k], bounces, place[KX], place[KY], place[KZ],
-            place[COS_PHI], place[SIN_PHI], n, kappa, n_stokes, zenith, azimuth,
+            end, 1, k, bounces, cos_beta, turn, state[k, KX], state[k, KY], state[k, KZ],
+            state[k, COS_PHI], state[k, SIN_PHI], n, kappa, n_stokes, zenith, azimuth,
             mueller, brdf, energy, counts,
         )  # fmt: skip
     return kept

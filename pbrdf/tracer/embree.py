@@ -54,8 +54,8 @@ def trace_direction(
     size = min(CHUNK, plan.n_rays)
     state = np.empty((size, wavefront.N_STATE))
     cell = np.empty((size, wavefront.N_CELL), dtype=np.int64)
-    cos_beta = np.empty((size, plan.max_bounces))
-    turn = np.empty((size, plan.max_bounces + 1, 2))
+    cos_beta = np.empty((plan.max_bounces, size))
+    turn = np.empty((plan.max_bounces + 1, size, 2))
     mueller = np.zeros((4, 4))
     zenith, azimuth = bin_edges(plan.n_theta, plan.n_dphi)
     for first in range(0, plan.n_rays, size):
