@@ -1,5 +1,6 @@
 """Files in and out; units and conventions are converted here and nowhere else."""
 
+from data_io._text import MissingUnitWarning
 from data_io.goniometer import in_plane, read_goniometer, view_angle, write_goniometer
 from data_io.heightmap import read_height_map
 from data_io.micrograph import (
@@ -11,7 +12,7 @@ from data_io.micrograph import (
 )
 from data_io.mitsuba import export_mitsuba
 from data_io.model import read_model, write_model
-from data_io.profile import MissingUnitWarning, Profile, read_profile
+from data_io.profile import Profile, read_profile
 from data_io.results import read_result, write_result
 
 __all__ = [

@@ -1,6 +1,7 @@
 """Text files in, with a line number for everything that is wrong in them."""
 
 import re
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from pbrdf.errors import DataFileError
+
+
+class MissingUnitWarning(UserWarning):
+    """A file names no length unit and none was given: micrometres are assumed."""
+
 
 COMMENT_MARKS = ("#", "%")
 ZIP_MAGIC = b"PK\x03\x04"
@@ -196,6 +202,15 @@ def unit_factor(name: str) -> float:
         msg = f"unit must be one of {KNOWN_UNITS}, got {name!r}. Name the unit in the file."
         raise ValueError(msg)
     return LENGTH_UNITS[key]
+
+
+def warn_missing_unit(path: str | Path) -> None:
+    """Say that a file without unit is taken as micrometres."""
+    msg = (
+        f"{Path(path).name}: no length unit is named, micrometres are assumed. "
+        "Name units in the header (x_um,z_um), or give unit=."
+    )
+    warnings.warn(msg, MissingUnitWarning, stacklevel=5)
 
 
 def header_units(text: str) -> list[str]:

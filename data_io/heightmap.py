@@ -15,6 +15,7 @@ from data_io._text import (
     read_numbers,
     split_header,
     unit_factor,
+    warn_missing_unit,
 )
 from data_io.instruments import read_instrument_map
 from data_io.x3p import read_x3p_map
@@ -82,7 +83,7 @@ def read_height_map(
         _refuse_arguments(path, spacing, unit)
         return read_x3p_map(path)
     if path.suffix.lower() in _TEXT_SUFFIXES:
-        return _read_text(path, spacing, unit)
+        return _read_any_text(path, spacing, unit)
     if path.suffix.lower() == ".npy":
         problem = "expected a NumPy array, the file does not start like one"
         raise DataFileError(path, problem, "Write it with numpy.save.")
@@ -135,6 +136,19 @@ def _read_npy(path: Path, spacing: Spacing | None, unit: str | None) -> HeightMa
     return build_map(path, rows.astype(np.float64) * factor, _steps(path, spacing))
 
 
+def _read_any_text(path: Path, spacing: Spacing | None, unit: str | None) -> HeightMap:
+    """Read a text file, or one of an instrument that writes text of its own layout."""
+    try:
+        return _read_text(path, spacing, unit)
+    except DataFileError as fault:
+        if spacing is not None or unit is not None:
+            raise
+        try:
+            return read_instrument_map(path)
+        except DataFileError:
+            raise fault from None
+
+
 def _read_text(path: Path, spacing: Spacing | None, unit: str | None) -> HeightMap:
     header, data = split_header(path, read_lines(path))
     names = _list_columns(header)
@@ -142,6 +156,9 @@ def _read_text(path: Path, spacing: Spacing | None, unit: str | None) -> HeightM
         return _read_list(path, header, data, names, spacing, unit)
     rows = read_numbers(path, data)
     steps, factor = _matrix_header(path, header, rows.shape)
+    # Three columns of unknown spacing are no map but x, y, z
+    if rows.shape[1] == 3 and steps is None and spacing is None:
+        return _read_list(path, header, data, ["x", "y", "z"], spacing, unit)
     if steps is not None and spacing is not None and not np.allclose(steps, spacing):
         problem = f"expected the spacing given, {spacing} um, the header says {steps} um"
         raise DataFileError(path, problem, "Leave the argument out or mend the header.")
@@ -175,7 +192,9 @@ def _read_list(
     if columns.shape[1] != 3:
         problem = f"expected three columns x, y, z, got {columns.shape[1]}"
         raise DataFileError(path, problem, "Keep three.", line=data[0].number)
-    units = header_units(header[-1].text)
+    units = header_units(header[-1].text) if header else []
+    if not units and unit is None:
+        warn_missing_unit(path)
     if len(units) not in (0, 1, 3):
         problem = f"expected a unit for each of x, y, z, got {units}"
         cure = "Write x_um,y_um,z_um or another unit of each."

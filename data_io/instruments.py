@@ -14,6 +14,19 @@ from data_io._text import LENGTH_UNITS, normalise_unit
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
 
+# Binary formats that may hold a profile as well
+INSTRUMENT_SUFFIXES = {
+    ".sur",
+    ".pro",
+    ".sdf",
+    ".opd",
+    ".vk3",
+    ".vk4",
+    ".vk6",
+    ".gwy",
+    ".spm",
+}
+
 
 def read_instrument_map(path: str | Path) -> HeightMap:
     """Read the height map of an instrument's file; missing points become NaN. [um]

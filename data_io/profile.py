@@ -1,7 +1,6 @@
 """Surface profiles z(x): the container and the reader of text files."""
 
 import re
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,13 +18,11 @@ from data_io._text import (
     read_numbers,
     split_header,
     unit_factor,
+    warn_missing_unit,
 )
+from data_io.instruments import INSTRUMENT_SUFFIXES, read_instrument_profile
 from data_io.x3p import read_x3p
 from pbrdf.errors import DataFileError, require
-
-
-class MissingUnitWarning(UserWarning):
-    """A file names no length unit and none was given: micrometres are assumed."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -110,7 +107,7 @@ class Profile:
 
 
 def read_profile(path: str | Path, *, unit: str | tuple[str, str] | None = None) -> Profile:
-    r"""Read a surface profile from a text file of two columns, x and z, or from x3p.
+    r"""Read a surface profile from a text file of two columns, or an instrument's own file.
 
     Comma, semicolon, tab and space separate columns; lines that start with # or % are
     comments. Units come from the header (``x_um,z_um`` or ``x [mm]  z [nm]``) or from the
@@ -151,6 +148,9 @@ def read_profile(path: str | Path, *, unit: str | tuple[str, str] | None = None)
     """
     if read_bytes(path)[:4] == ZIP_MAGIC:
         return _read_x3p_profile(path)
+    if Path(path).suffix.lower() in INSTRUMENT_SUFFIXES:
+        x, z = read_instrument_profile(path)
+        return build_profile(path, x[np.isfinite(z)], z[np.isfinite(z)])
     header, data = split_header(path, read_lines(path))
     names, column_x, column_z = _columns(path, header, data[0])
     block = read_numbers(path, data, names)
@@ -254,11 +254,7 @@ def _factors(
     line, found = _named_units(header, names, column_x, column_z)
     if found is None:
         if given is None:
-            msg = (
-                f"{Path(path).name}: no length unit is named, micrometres are assumed. "
-                "Name units in the header (x_um,z_um), or give unit=."
-            )
-            warnings.warn(msg, MissingUnitWarning, stacklevel=4)
+            warn_missing_unit(path)
             return 1.0, 1.0
         return given
     factors = unit_factor(found[0]), unit_factor(found[1])

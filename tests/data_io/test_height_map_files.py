@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
-from data_io import read_height_map, read_profile
+from data_io import MissingUnitWarning, read_height_map, read_profile
 from pbrdf.errors import DataFileError
 
 # Rows of constant y: 3 rows, 4 columns, no symmetry, one missing point
@@ -112,6 +112,12 @@ def test_text_layouts_give_the_same_map(tmp_path, text, options):
     assert_allclose(surface.heights, ROWS.T, rtol=1e-12)
     assert_allclose(surface.spacing, (0.5, 0.2), rtol=1e-12)
     assert not surface.periodic
+
+
+def test_a_list_without_unit_is_micrometres_and_says_so(tmp_path):
+    path = write(tmp_path, list_text().partition("\n")[2], "map.xyz")
+    with pytest.warns(MissingUnitWarning, match=r"map\.xyz.*micrometres"):
+        assert_allclose(read_height_map(path).heights, ROWS.T)
 
 
 @given(
