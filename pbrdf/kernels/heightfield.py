@@ -181,7 +181,8 @@ def walk(
                     v_mid = y0 + speed_y * t_mid - j
                     surface = plane_height(z00, z10, z01, z11, first, u_mid, v_mid)
                     clear_mid = z + speed_z * t_mid - surface
-                    if clear_mid <= 0.0:
+                    # A facet met at a corner only, and moved away from, is no hit
+                    if clear_mid <= 0.0 and clear_mid < clear:
                         t_hit = zero_between(t, t_mid, clear, clear_mid)
                         u = x0 + speed_x * t_hit - i
                         v = y0 + speed_y * t_hit - j
@@ -193,7 +194,7 @@ def walk(
                     second = 1 - first
                     surface = plane_height(z00, z10, z01, z11, second, u_out, v_out)
                     clear = z_out - surface
-                    if clear <= 0.0:
+                    if clear <= 0.0 and clear < clear_mid:
                         t_hit = zero_between(t_mid, t_out, clear_mid, clear)
                         u = x0 + speed_x * t_hit - i
                         v = y0 + speed_y * t_hit - j
