@@ -129,6 +129,7 @@ def hemisphere_figure(simulation: xr.Dataset, theta_i: float) -> "Figure":
             azimuth, zenith, values, cmap=colours, vmin=limits[0], vmax=limits[1]
         )
         axis.set(title=title, xticklabels=[], yticks=(30, 60))
+        axis.set_rlabel_position(90)
         axis.grid(alpha=0.3)
         figure.colorbar(image, ax=axis, shrink=0.75)
     angle = np.rad2deg(float(here.theta_i))
@@ -169,6 +170,10 @@ def _spans_decades(values: np.ndarray) -> bool:
     return bool(values.size) and float(values.max() / np.median(values)) > 30.0
 
 
+def _models_of(curve: xr.Dataset) -> dict[str, tuple[str, str]]:
+    return {model: look for model, look in MODELS.items() if f"{model}_M00" in curve}
+
+
 def _incidence(dataset: xr.Dataset) -> str:
     return f"{np.rad2deg(float(np.mean(dataset.theta_i))):.4g}°"
 
@@ -176,7 +181,7 @@ def _incidence(dataset: xr.Dataset) -> str:
 def _draw_curves(axis: "Axes", name: str, curve: xr.Dataset, colour: str) -> None:
     """Draw both models of one incidence, with the 95 % band of the simulation."""
     view = np.rad2deg(curve.theta_view.values)
-    for model, (label, style) in MODELS.items():
+    for model, (label, style) in _models_of(curve).items():
         value = curve[f"{model}_{name}"]
         axis.plot(
             view, value, style, color=colour, linewidth=1.3,
@@ -208,7 +213,7 @@ def _draw_residuals(
     if name not in scan:
         return
     at = scan.theta_view.values
-    for model, (_, style) in MODELS.items():
+    for model, (_, style) in _models_of(curve).items():
         there = np.interp(at, curve.theta_view.values, curve[f"{model}_{name}"].values)
         axis.plot(
             np.rad2deg(at), scan[name].values - there, style, color=colour, linewidth=1.0,

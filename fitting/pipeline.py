@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from fitting.curves import plane_curves
 from fitting.fit import fit
 from fitting.observations import Mask
 from fitting.result import FitResult
@@ -162,7 +163,12 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
         monte_carlo=monte_carlo,
         scan_slope=scan_slope,
         simulation=simulation,
-        curves=plane_curves(analytic.model, monte_carlo.model),
+        curves=plane_curves(
+            simulation.theta_i.values,
+            simulation.theta_s.values,
+            analytic=analytic.model,
+            monte_carlo=monte_carlo.model,
+        ),
         unknown=(*_unknown(measurement, statistics), *analytic.warnings),
         seconds=clock.seconds,
     )
@@ -194,38 +200,6 @@ def with_simulation_error(measurement: xr.Dataset, curve: SimulatedCurve) -> xr.
             if name in measurement:
                 weighed[name] = np.hypot(measurement[name], error[:, out, into])
     return weighed
-
-
-def plane_curves(model: MicrofacetModel, curve: SimulatedCurve) -> xr.Dataset:
-    """Return M00, M10 and DOLP of both models against incidence and signed view angle."""
-    dataset = curve.dataset
-    view = np.concatenate([-dataset.theta_s.values[::-1], dataset.theta_s.values])
-    theta_i, theta_view = np.meshgrid(dataset.theta_i.values, view, indexing="ij")
-    where = theta_i, np.abs(theta_view), np.where(theta_view > 0.0, np.pi, 0.0)
-    flat = [angle.ravel() for angle in where]
-    simulated = curve.brdf(*flat).reshape(*theta_i.shape, 4, 4)
-    error = curve.stderr(*flat).reshape(*theta_i.shape, 4, 4)
-    values = {
-        **{
-            f"analytic_{name}": value
-            for name, value in _summary(model.brdf(*where)).items()
-        },
-        **{f"monte_carlo_{name}": value for name, value in _summary(simulated).items()},
-        "monte_carlo_M00_stderr": error[..., 0, 0],
-        "monte_carlo_M10_stderr": error[..., 1, 0],
-        # M00 and M10 of a bin err together, so their ratio errs less than this
-        "monte_carlo_DOLP_stderr": error[..., 1, 0] / simulated[..., 0, 0],
-    }
-    dims = ("theta_i", "theta_view")
-    return xr.Dataset(
-        {name: (dims, value) for name, value in values.items()},
-        coords={"theta_i": dataset.theta_i.values, "theta_view": view},
-    )
-
-
-def _summary(mueller: np.ndarray) -> dict[str, np.ndarray]:
-    m00, m10, m20 = mueller[..., 0, 0], mueller[..., 1, 0], mueller[..., 2, 0]
-    return {"M00": m00, "M10": m10, "DOLP": np.hypot(m10, m20) / m00}
 
 
 def _simulate(

@@ -12,7 +12,13 @@ from typing import Annotated
 import typer
 
 from pbrdf import __version__
+from pbrdf.cli.export import export
+from pbrdf.cli.fit import fit
 from pbrdf.cli.pipeline import pipeline
+from pbrdf.cli.plot import plot
+from pbrdf.cli.simulate import simulate
+from pbrdf.cli.statistics import statistics
+from pbrdf.cli.sweep import sweep
 
 __all__ = ["app", "main"]
 
@@ -47,7 +53,15 @@ def _options(
     """Polarised reflectance of real rough surfaces: measured, simulated and fitted."""
 
 
-app.command()(pipeline)
+@app.command(hidden=True)
+def dew() -> None:
+    """Compare drops of several contact angles on a surface; not in this version."""
+    msg = "dew needs water on the surface, which this version does not simulate."
+    raise ValueError(msg)
+
+
+for _command_function in (pipeline, statistics, fit, simulate, sweep, plot, export):
+    app.command()(_command_function)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

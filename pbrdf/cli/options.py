@@ -42,6 +42,14 @@ class Kind(StrEnum):
     image = "image"
 
 
+class Stokes(StrEnum):
+    """Which Stokes elements to compute."""
+
+    full = "full"
+    linear = "linear"
+    unpolarized = "unpolarized"
+
+
 Surface = Annotated[
     Path,
     typer.Argument(
@@ -117,6 +125,19 @@ Realizations = Annotated[
 Seed = Annotated[int, typer.Option(min=0, help="Makes the run reproducible, bit for bit.")]
 Workers = Annotated[
     int | None, typer.Option(min=1, max=1024, help="Threads; all cores if not given.")
+]
+Incidences = Annotated[
+    str, typer.Option("--theta-i-deg", help="Zenith angles of the source, by commas.")
+]
+Target = Annotated[
+    float | None,
+    typer.Option("--target-rel-error", min=1e-6, max=0.999, help="Go on to this error."),
+]
+Bounces = Annotated[int, typer.Option("--max-bounces", min=1, max=10_000)]
+ThetaBins = Annotated[int, typer.Option("--n-theta", min=1, max=2000, help="Zenith bins.")]
+DphiBins = Annotated[int, typer.Option("--n-dphi", min=2, max=4000, help="Azimuth bins.")]
+StokesOption = Annotated[
+    Stokes, typer.Option("--stokes", help="Stokes elements to compute.")
 ]
 Output = Annotated[
     Path | None,

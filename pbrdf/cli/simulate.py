@@ -1,0 +1,100 @@
+"""`pbrdf simulate`: trace a scene described by a TOML file."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pbrdf.cli import options
+from pbrdf.cli.options import Stokes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def simulate(
+    scene: Annotated[Path, typer.Argument(help="Scene file (TOML).", show_default=False)],
+    theta_i: options.Incidences = "30",
+    phi_i: Annotated[
+        str,
+        typer.Option(
+            "--phi-i-deg", help="Azimuth of the source, or uniform for its average."
+        ),
+    ] = "0",
+    output: options.Output = None,
+    force: options.Force = False,
+    n_rays: options.Rays = 100_000,
+    realizations: options.Realizations = 16,
+    target: options.Target = None,
+    max_bounces: options.Bounces = 64,
+    wavelength: Annotated[
+        str | None,
+        typer.Option(
+            "--wavelength-um", help="Wavelengths, for a material given as a table."
+        ),
+    ] = None,
+    n_theta: options.ThetaBins = 45,
+    n_dphi: options.DphiBins = 90,
+    stokes: options.StokesOption = Stokes.full,
+    seed: options.Seed = 0,
+    workers: options.Workers = None,
+) -> None:
+    """Simulate the Mueller BRDF of a rough surface over the whole hemisphere.
+
+    Example: pbrdf simulate scene.toml --theta-i-deg 10,30,60 -o result.nc
+    """
+    import numpy as np
+
+    import pbrdf
+    from data_io import write_result
+    from pbrdf.cli.progress import progress_bar
+    from pbrdf.cli.staging import staged_file
+
+    loaded = pbrdf.load_scene(scene)
+    target_file = output or scene.with_suffix(".nc")
+    azimuth = "uniform" if phi_i == "uniform" else options.numbers(phi_i, "--phi-i-deg")[0]
+    waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
+    with staged_file(target_file, force=force) as stage:
+        with progress_bar("tracing") as progress:
+            result = pbrdf.simulate(
+                loaded,
+                np.deg2rad(options.numbers(theta_i, "--theta-i-deg")),
+                phi_i=azimuth if isinstance(azimuth, str) else float(np.deg2rad(azimuth)),
+                n_rays=n_rays,
+                realizations=realizations,
+                seed=seed,
+                max_bounces=max_bounces,
+                target_rel_error=target,
+                wavelength=waves,
+                n_theta=n_theta,
+                n_dphi=n_dphi,
+                stokes=stokes.value,
+                workers=workers,
+                progress=progress,
+            )
+        write_result(result, stage)
+    for line in budget(result):
+        typer.echo(line)
+    typer.echo(f"Result: {target_file}")
+
+
+def budget(result: "xr.Dataset") -> Iterator[str]:
+    """Yield where the light went, one line an incidence (the first wavelength)."""
+    import numpy as np
+
+    if "wavelength" in result.dims:
+        result = result.isel(wavelength=0)
+    for position, theta_i in enumerate(result.theta_i.values):
+        here = result.isel(theta_i=position)
+        parts = [
+            f"{name} {float(here[name]):.6f}"
+            for name in ("absorbed", "transmitted", "truncated", "leaked")
+        ]
+        albedo = ", ".join(
+            f"{label}: {float(value):.6f} ± {float(error):.1g}"
+            for label, value, error in zip(
+                here.bounces.values, here.albedo, here.albedo_stderr, strict=True
+            )
+        )
+        yield f"{np.rad2deg(theta_i):.4g}°  albedo by bounces {albedo}; {', '.join(parts)}"
