@@ -1,6 +1,31 @@
 """The closed-form model: slope distributions, shadowing, the microfacet BRDF."""
 
+from pbrdf.analytic.hemisphere import HemisphericalReflectance, emissivity, reflectance
 from pbrdf.analytic.microfacet import MicrofacetModel
-from pbrdf.analytic.tables import SHADOWING, SLOPE_DISTRIBUTIONS
+from pbrdf.analytic.named import (
+    beard_maxwell,
+    generalised,
+    priest_germer,
+    torrance_sparrow,
+)
+from pbrdf.analytic.tables import (
+    GRAZING_FORMS,
+    SHADOWING,
+    SLOPE_DISTRIBUTIONS,
+    VOLUME_FORMS,
+)
 
-__all__ = ["SHADOWING", "SLOPE_DISTRIBUTIONS", "MicrofacetModel"]
+__all__ = [
+    "GRAZING_FORMS",
+    "SHADOWING",
+    "SLOPE_DISTRIBUTIONS",
+    "VOLUME_FORMS",
+    "HemisphericalReflectance",
+    "MicrofacetModel",
+    "beard_maxwell",
+    "emissivity",
+    "generalised",
+    "priest_germer",
+    "reflectance",
+    "torrance_sparrow",
+]

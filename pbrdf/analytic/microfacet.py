@@ -9,11 +9,18 @@ import numpy as np
 import numpy.typing as npt
 
 from pbrdf.analytic.geometry import flat_geometry
-from pbrdf.analytic.tables import SHADOWING, SLOPE_DISTRIBUTIONS, code_of
+from pbrdf.analytic.tables import (
+    GRAZING_FORMS,
+    SHADOWING,
+    SLOPE_DISTRIBUTIONS,
+    VOLUME_FORMS,
+    code_of,
+)
 from pbrdf.errors import require
 from pbrdf.kernels import microfacet as kernel
 from pbrdf.kernels.shadowing import Shadowing
 from pbrdf.kernels.slopes import Roughness, slope_norm
+from pbrdf.kernels.volume import Diffuse
 from pbrdf.optics.materials import Material
 
 __all__ = ["MicrofacetModel"]
@@ -43,6 +50,13 @@ class MicrofacetModel:
         `Material.diffuse_albedo`, the base under the interface. [1]
     shadow_omega, shadow_tau : float
         Constants of the Maxwell-Beard factor. [rad]
+    volume_albedo, volume_depolarization : float
+        Albedo of the scatter under the interface, and how much it depolarises; in [0, 1].
+        Takes the place of `Material.diffuse_albedo`: give one or the other. [1]
+    grazing_albedo : float
+        Strength of the second term of (23), which grows at grazing. [1]
+    volume_form, grazing_form : str
+        Keys of `pbrdf.analytic.VOLUME_FORMS` and `GRAZING_FORMS`.
 
     Raises
     ------
@@ -74,6 +88,11 @@ class MicrofacetModel:
     diffuse_albedo: float = 0.0
     shadow_omega: float = 0.7
     shadow_tau: float = 0.25
+    volume_albedo: float = 0.0
+    volume_depolarization: float = 1.0
+    grazing_albedo: float = 0.0
+    volume_form: str = "polarised-base"
+    grazing_form: str = "bounded"
 
     def __post_init__(self) -> None:
         slopes = require(
@@ -87,7 +106,19 @@ class MicrofacetModel:
         object.__setattr__(self, "slope_rms", tuple(pair) if slopes.ndim else pair)
         code_of(SLOPE_DISTRIBUTIONS, self.slope_distribution, "slope_distribution")
         code_of(SHADOWING, self.shadowing, "shadowing")
-        for name in ("specular_gain", "diffuse_albedo"):
+        code_of(VOLUME_FORMS, self.volume_form, "volume_form")
+        code_of(GRAZING_FORMS, self.grazing_form, "grazing_form")
+        for name in ("volume_albedo", "volume_depolarization"):
+            value = getattr(self, name)
+            require(name, value, lambda v: (v >= 0) & (v <= 1), "lie in [0, 1] [1]", "")
+        if self.volume_albedo and self.material.diffuse_albedo:
+            msg = (
+                f"volume_albedo must be 0 over a material with diffuse_albedo "
+                f"{self.material.diffuse_albedo:g}, got {self.volume_albedo:g}. "
+                "Both mean the base under the interface; give one of them."
+            )
+            raise ValueError(msg)
+        for name in ("specular_gain", "diffuse_albedo", "grazing_albedo"):
             require(name, getattr(self, name), lambda v: v >= 0, "be >= 0 [1]", "")
         for name in ("shadow_omega", "shadow_tau"):
             require(name, getattr(self, name), lambda v: v > 0, "be > 0 [rad]", "")
@@ -155,7 +186,20 @@ class MicrofacetModel:
             ),
             Shadowing(SHADOWING[self.shadowing].code, self.shadow_omega, self.shadow_tau),
             float(self.specular_gain),
+            self._diffuse(),
+        )
+
+    def _diffuse(self) -> Diffuse:
+        """Numbers of the terms (22) and (23)."""
+        volume_albedo = float(self.volume_albedo or self.material.diffuse_albedo)
+        return Diffuse(
             float(self.diffuse_albedo),
+            float(self.grazing_albedo),
+            GRAZING_FORMS[self.grazing_form].code,
+            volume_albedo,
+            VOLUME_FORMS[self.volume_form].code,
+            float(self.volume_depolarization),
+            volume_albedo > 0,
         )
 
 

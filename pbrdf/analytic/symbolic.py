@@ -9,8 +9,14 @@ from collections.abc import Callable, Mapping
 from types import FunctionType
 from typing import Any
 
-from pbrdf.analytic.tables import SHADOWING, SLOPE_DISTRIBUTIONS, code_of
-from pbrdf.kernels import facet, microfacet, slopes
+from pbrdf.analytic.tables import (
+    GRAZING_FORMS,
+    SHADOWING,
+    SLOPE_DISTRIBUTIONS,
+    VOLUME_FORMS,
+    code_of,
+)
+from pbrdf.kernels import facet, microfacet, slopes, volume
 from pbrdf.kernels.shadowing import Shadowing
 
 __all__ = ["brdf_expression", "rebind"]
@@ -64,7 +70,7 @@ def _casadi_operations() -> dict[str, Any]:
     return {name: getattr(ca, name) for name in names} | {"select": select, "abs": ca.fabs}
 
 
-def brdf_expression(
+def brdf_expression(  # noqa: PLR0913  (one keyword for each choice of the model)
     model_parameters: Mapping[str, Any],
     theta_i: Any,
     theta_s: Any,
@@ -72,6 +78,8 @@ def brdf_expression(
     *,
     shadowing: str = "smith-correlated",
     slope_distribution: str = "gaussian",
+    volume_form: str = "polarised-base",
+    grazing_form: str = "bounded",
     phi_i: Any = 0.0,
 ) -> Any:
     """Mueller BRDF of `MicrofacetModel` as a CasADi expression.
@@ -79,12 +87,12 @@ def brdf_expression(
     Parameters
     ----------
     model_parameters : mapping of str to casadi.SX, casadi.MX or float
-        `n` and `slope_rms` (or `slope_rms_x` and `slope_rms_y`) are needed; `kappa`,
-        `specular_gain`, `diffuse_albedo`, `shadow_omega`, `shadow_tau` default as in
-        `MicrofacetModel`.
+        `n` and `slope_rms` (or `slope_rms_x` and `slope_rms_y`) are needed; the other
+        numbers of `MicrofacetModel` default as there. Leave out a volume_albedo of 0: it
+        costs more than all the rest.
     theta_i, theta_s, dphi, phi_i : casadi.SX, casadi.MX or float
         One geometry; map a `casadi.Function` over many. [rad]
-    shadowing, slope_distribution : str
+    shadowing, slope_distribution, volume_form, grazing_form : str
         Names as in `MicrofacetModel`.
 
     Returns
@@ -115,18 +123,30 @@ def brdf_expression(
     rule = code_of(SHADOWING, shadowing, "shadowing")
     slope_x, slope_y = given["slope_rms_x"], given["slope_rms_y"]
     norm = rebind(slopes.slope_norm, operations, copies)(law, slope_x, slope_y)
+    albedo = given["volume_albedo"]
+    diffuse = volume.Diffuse(
+        given["diffuse_albedo"],
+        given["grazing_albedo"],
+        code_of(GRAZING_FORMS, grazing_form, "grazing_form"),
+        albedo,
+        code_of(VOLUME_FORMS, volume_form, "volume_form"),
+        given["volume_depolarization"],
+        not (isinstance(albedo, float | int) and albedo == 0),
+    )
     surface = microfacet.Surface(
         slopes.Roughness(law, slope_x, slope_y, slope_x is slope_y, norm),
         Shadowing(rule, given["shadow_omega"], given["shadow_tau"]),
         given["specular_gain"],
-        given["diffuse_albedo"],
+        diffuse,
     )
     cos_phi, sin_phi = operations["cos"](phi_i), operations["sin"](phi_i)
     way = rebind(facet.directions, operations, copies)(
         theta_i, theta_s, dphi, cos_phi, sin_phi
     )
     evaluate = rebind(microfacet.microfacet_brdf, operations, copies)
-    rows = evaluate(way, given["n"], given["kappa"], surface)
+    inside = rebind(volume.base_radiance, operations, copies)
+    radiance = inside(given["n"], given["kappa"], diffuse)
+    rows = evaluate(way, given["n"], given["kappa"], surface, radiance)
     return ca.vertcat(*(ca.horzcat(*row) for row in rows))
 
 
@@ -138,6 +158,9 @@ def _with_defaults(given: Mapping[str, Any]) -> dict[str, Any]:
         "diffuse_albedo": 0.0,
         "shadow_omega": 0.7,
         "shadow_tau": 0.25,
+        "volume_albedo": 0.0,
+        "volume_depolarization": 1.0,
+        "grazing_albedo": 0.0,
     }
     needed = {"n", "slope_rms_x", "slope_rms_y"}
     known = set(values) | needed | {"slope_rms"}

@@ -5,9 +5,16 @@ The two tables are what `MicrofacetModel` accepts and what the documentation pri
 
 from dataclasses import dataclass
 
-from pbrdf.kernels import shadowing, slopes
+from pbrdf.kernels import shadowing, slopes, volume
 
-__all__ = ["SHADOWING", "SLOPE_DISTRIBUTIONS", "Choice", "code_of"]
+__all__ = [
+    "GRAZING_FORMS",
+    "SHADOWING",
+    "SLOPE_DISTRIBUTIONS",
+    "VOLUME_FORMS",
+    "Choice",
+    "code_of",
+]
 
 
 @dataclass(frozen=True)
@@ -79,6 +86,35 @@ SHADOWING = {
         "1/(1 + max + w min), w = 4.41 dphi/(4.41 dphi + 1): at one azimuth only the lower "
         "direction is hidden",
         "van Ginneken, Stavridi, Koenderink, Appl. Opt. 37, 130 (1998); Heitz 2014",
+    ),
+}
+
+VOLUME_FORMS = {
+    "paper": Choice(
+        volume.PAPER,
+        "(a/pi) T(theta_i) T(theta_s), element 00 only",
+        "the paper's (22) with the 1/pi it lacks",
+    ),
+    "base": Choice(
+        volume.BASE,
+        "(a/pi) T(theta_i) T(theta_s) / (n^2 (1 - a F_i)), element 00 only",
+        "Lambertian base under a smooth interface; Wolff, J. Opt. Soc. Am. A 11, 2956",
+    ),
+    "polarised-base": Choice(
+        volume.POLARISED_BASE,
+        "(a/pi) T(theta_s) diag(1, p, p, p) T(theta_i) / (n^2 (1 - a F_i)), matrices T",
+        "the same, polarised by its way in and out; p = 1 - volume_depolarization",
+    ),
+}
+
+GRAZING_FORMS = {
+    "paper": Choice(
+        volume.PAPER, "(a/pi) / (cos_i cos_s)", "the paper's (23), unbounded at grazing"
+    ),
+    "bounded": Choice(
+        volume.BOUNDED,
+        "(2 a/pi) / (cos_i + cos_s)",
+        "Beard-Maxwell volume term; Westlund, Meyer 2002",
     ),
 }
 

@@ -154,7 +154,7 @@ def transmitted_powers(cos_beta, n, kappa):
 
 @jit
 def transmission_parts(cos_beta, n, kappa):
-    """(T_s + T_p)/2, (T_s - T_p)/2 and sqrt(T_s T_p), without a branch; 0 behind a mirror."""
+    """Return (T_s + T_p)/2, (T_s - T_p)/2, sqrt(T_s T_p) without a branch."""
     perfect = n == inf
     trans_s, trans_p = transmitted_powers(cos_beta, select(perfect, 1.0, n), kappa)
     open_part = select(perfect, 0.0, 1.0)

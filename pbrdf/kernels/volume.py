@@ -40,8 +40,8 @@ WEIGHTS = tuple((0.5 * _weights).tolist())
 def internal_reflectance(n, kappa):
     """Share of diffuse light that the interface throws back inside: 1 - (1 - F_e)/n^2.
 
-    F_e = 2 integral R(c) c dc is the reflectance for diffuse light from outside; Walsh 1926,
-    S. Duntley, J. Opt. Soc. Am. 32, 61 (1942).
+    F_e = 2 integral R(c) c dc is the reflectance for diffuse light from outside; Walsh
+    1926, S. Duntley, J. Opt. Soc. Am. 32, 61 (1942).
     """
     external = 0.0
     for k in range(len(NODES)):
@@ -55,8 +55,8 @@ def internal_reflectance(n, kappa):
 def base_radiance(n, kappa, diffuse):
     """Factor of the two transmittances in the volume term. [1/sr]
 
-    (22) with the 1/pi it lacks; a Lambertian base under the interface also spreads its light
-    over n^2 times the solid angle and gets back what the interface reflects inside.
+    (22) with the 1/pi it lacks; a Lambertian base under the interface also spreads its
+    light over n^2 times the solid angle and gets back what the interface reflects inside.
     """
     albedo = diffuse.volume_albedo
     if not diffuse.has_volume:
@@ -91,7 +91,7 @@ def volume_elements(way, n, kappa, diffuse, radiance):
 
 @jit
 def added_elements(way, n, kappa, diffuse, radiance):
-    """What (22) and (23) add to the elements 00, 01, 10, 11 and to 22 and 33. [1/sr]
+    """Sum of (22) and (23), added to the elements 00, 01, 10, 11 and to 22 and 33. [1/sr]
 
     (23) divides by cos_i cos_s and reflects more than it receives at grazing; the bounded
     form of the Beard-Maxwell model is 2 rho/(cos_i + cos_s).

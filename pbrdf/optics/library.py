@@ -1,8 +1,8 @@
 """Published optical constants, each with its source and valid range.
 
-Tables lie in the folder `tables`; bk7 and fused silica are dispersion formulas. Between table
-rows n and kappa are interpolated linearly; nothing is extrapolated. PTFE is missing: no
-table with a source was found, only its often quoted index of about 1.35.
+Tables lie in the folder `tables`; bk7 and fused silica are dispersion formulas. Between
+table rows n and kappa are interpolated linearly; nothing is extrapolated. PTFE is missing:
+no table with a source was found, only its often quoted index of about 1.35.
 """
 
 from functools import cache

@@ -5,7 +5,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pbrdf.analytic import SHADOWING, SLOPE_DISTRIBUTIONS, MicrofacetModel
+from pbrdf.analytic import (
+    GRAZING_FORMS,
+    SHADOWING,
+    SLOPE_DISTRIBUTIONS,
+    VOLUME_FORMS,
+    MicrofacetModel,
+)
 from pbrdf.analytic.symbolic import brdf_expression
 from pbrdf.optics import Material
 
@@ -51,6 +57,22 @@ def test_expression_equals_compiled_model(shadowing, slope_distribution):
     expected = compiled(VALUES, at, **choices)
     scale = expected[:, 0, 0]
     assert_allclose(actual / scale, expected.reshape(-1, 16).T / scale, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("volume_form", VOLUME_FORMS)
+@pytest.mark.parametrize("grazing_form", GRAZING_FORMS)
+def test_further_terms_are_the_compiled_ones(volume_form, grazing_form):
+    values = {
+        "n": 1.4, "kappa": 0.1, "slope_rms": 0.2, "diffuse_albedo": 0.1,
+        "volume_albedo": 0.3, "volume_depolarization": 0.6, "grazing_albedo": 0.05,
+    }  # fmt: skip
+    symbols = {name: ca.SX.sym(name) for name in values}
+    forms = {"volume_form": volume_form, "grazing_form": grazing_form}
+    matrix = brdf_expression(symbols, 0.4, 0.9, 2.0, **forms)
+    actual = ca.Function("f", list(symbols.values()), [matrix])(*values.values())
+    material = Material(values.pop("n"), values.pop("kappa"))
+    expected = MicrofacetModel(material, **values, **forms).brdf(0.4, 0.9, 2.0)
+    assert_allclose(np.array(actual), expected, rtol=1e-12, atol=1e-16)
 
 
 def test_matrix_symbols_serve_as_well():
