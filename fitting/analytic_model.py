@@ -91,6 +91,7 @@ class AnalyticModel:
     def _numbers(self) -> dict[str, float]:
         """Return the model's other fields that are numbers."""
         skip = {"material", "slope_rms", "slope_distribution", "shadowing"}
+        skip |= {"volume_form", "grazing_form"}
         return {
             field.name: getattr(self.model, field.name)
             for field in fields(self.model)

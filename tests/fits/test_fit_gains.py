@@ -1,4 +1,4 @@
-"""Specular gain and diffuse albedo: exact recovery, both solvers, uncertainties, warnings."""
+"""Specular gain and diffuse albedo: recovery, both solvers, uncertainties, warnings."""
 
 import time
 
@@ -18,7 +18,7 @@ UNIT = MicrofacetModel(Material(1.53), slope_rms=0.252)
 
 
 def design(measurement):
-    """Columns of the linear problem from the compiled model, which shares no code with it."""
+    """Columns of the linear problem from the compiled model, not from the symbolic one."""
     angles = [measurement[name].values for name in ("theta_i", "theta_s", "dphi")]
     facets = UNIT.brdf(*angles)
     names = [n for n in measurement.data_vars if not n.endswith("_stderr")]
