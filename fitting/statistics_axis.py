@@ -1,5 +1,7 @@
 """Statistics along one axis from the fit of its structure function."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from fitting.estimate import Estimate
@@ -46,9 +48,7 @@ def axis_statistics(
     length_variance = fit.log_variance(lambda t: fit.correlation_at(t).corr_length)
     return AxisStatistics(
         axis=name,
-        corr_length=Estimate.positive(
-            fit.correlation.corr_length, inflation * length_variance
-        ),
+        corr_length=_unbiased(fit.correlation.corr_length, inflation * length_variance),
         slope_rms=_derivative_rms(fit, band, 1, inflation),
         curvature_rms=_derivative_rms(fit, band, 2, inflation),
         cutoff=cutoff,
@@ -58,6 +58,12 @@ def axis_statistics(
         plain_corr_length=float(sampling.first_fall()),
         fit=fit,
     )
+
+
+def _unbiased(length: float, log_variance: float) -> Estimate:
+    """Length whose logarithm is estimated without bias; its mean is exp(v/2) larger."""
+    estimate = Estimate.positive(length, log_variance)
+    return replace(estimate, value=length * float(np.exp(-min(log_variance, 1.0) / 2)))
 
 
 def _derivative_rms(

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from fitting.statistics_gaussianity import Gaussianity
 from fitting.statistics_histogram import Histogram, make_histogram
 from fitting.statistics_spectrum import PowerSpectrum, SlopeBands, line_spectrum
 from fitting.statistics_texture import Anisotropy
+
+if TYPE_CHECKING:
+    from pbrdf.surface.gaussian import GaussianSurface
+    from pbrdf.surface.measured import MeasuredSurface
 
 Array = np.ndarray
 
@@ -245,6 +249,43 @@ class SurfaceStatistics:
         noise = 2 * chosen.spacing * (chosen.fit.noise + self.quantisation**2 / 12)
         model = 2 * chosen.fit.variance * chosen.fit.correlation.spectrum(frequency)
         return PowerSpectrum(frequency, psd, model + noise, noise)
+
+    def to_surface(
+        self,
+        shape: tuple[int, int],
+        spacing: float | tuple[float, float],
+        *,
+        kind: str = "gaussian",
+    ) -> "GaussianSurface | MeasuredSurface":
+        """Make a random surface with these statistics, to draw scenes from.
+
+        Parameters
+        ----------
+        shape : (int, int)
+            Grid nodes (nx, ny).
+        spacing : float or (float, float)
+            Grid step; a tenth of corr_length or less. [um]
+        kind : str
+            ``gaussian``: Gaussian heights and autocorrelation with the measured slope_rms
+            and corr_length. ``measured``: the fitted form of the autocorrelation and the
+            measured height distribution.
+
+        Raises
+        ------
+        ValueError
+            If the measurement failed (`reliable` is False) or `kind` is unknown.
+        """
+        from fitting.statistics_scene import gaussian_surface, measured_surface
+
+        if kind == "gaussian":
+            return gaussian_surface(self, shape, spacing)
+        if kind == "measured":
+            return measured_surface(self, shape, spacing)
+        msg = (
+            f"kind must be one of gaussian, measured, got {kind!r}. For the measured "
+            "heights themselves use the HeightMap."
+        )
+        raise ValueError(msg)
 
     def estimates(self) -> dict[str, tuple[Estimate, str]]:
         """Every estimate with its unit, by name."""

@@ -2,5 +2,6 @@
 
 from pbrdf.surface.gaussian import GaussianSurface
 from pbrdf.surface.heightmap import HeightMap
+from pbrdf.surface.measured import MeasuredSurface
 
-__all__ = ["GaussianSurface", "HeightMap"]
+__all__ = ["GaussianSurface", "HeightMap", "MeasuredSurface"]
