@@ -3,8 +3,8 @@
 import re
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,8 +37,7 @@ KNOWN_UNITS = "nm, um, mm, m"
 _UNIT_IN_HEADER = re.compile(r"_([A-Za-zµμÅå]+)\b|[\[(]\s*([A-Za-zµμÅå]+)\s*[\])]")
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """One line of a file: its number, counted from 1, and its text without line end."""
 
     number: int
@@ -47,6 +46,23 @@ class Line:
     def cells(self, delimiter: str | None) -> list[str]:
         """Return the stripped cells; delimiter None splits at any white space."""
         return [cell.strip() for cell in self.text.strip().split(delimiter)]
+
+
+class Rows(NamedTuple):
+    """Lines of data; apart from their numbers, because a profile has a million of them."""
+
+    numbers: Sequence[int]
+    texts: list[str]
+
+    @property
+    def first(self) -> Line:
+        """The first line."""
+        return Line(self.numbers[0], self.texts[0])
+
+    @classmethod
+    def of(cls, lines: Iterable[Line]) -> "Rows":
+        """Return the given lines."""
+        return cls(*(list(part) for part in zip(*lines, strict=True)))
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -67,6 +83,11 @@ def read_bytes(path: str | Path) -> bytes:
 
 def read_lines(path: str | Path) -> list[Line]:
     """Return all lines of a text file; refuse an empty or a binary one."""
+    return [Line(i, text) for i, text in enumerate(read_texts(path), start=1)]
+
+
+def read_texts(path: str | Path) -> list[str]:
+    """Return the text of all lines of a file; refuse an empty or a binary one."""
     content = read_bytes(path)
     problem = "expected a text file, found binary data"
     cure = "Give the text export of the instrument."
@@ -86,7 +107,7 @@ def read_lines(path: str | Path) -> list[Line]:
             raise DataFileError(path, problem, cure) from error
     if re.search(r"[\x00-\x08\x0e-\x1f]", text):
         raise DataFileError(path, problem, cure)
-    return [Line(i, row) for i, row in enumerate(re.split(r"\r\n|\n|\r", text), start=1)]
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 def is_comment(line: Line) -> bool:
@@ -108,33 +129,39 @@ def find_delimiter(line: Line) -> str | None:
     return next((mark for mark in (";", "\t", ",") if mark in line.text), None)
 
 
-def split_header(path: str | Path, lines: Iterable[Line]) -> tuple[list[Line], list[Line]]:
-    """Divide a numeric text file into its header (with all comments) and its data lines.
+def split_header(path: str | Path) -> tuple[list[Line], Rows]:
+    """Divide a numeric text file into its header and its data lines.
 
-    Data begin at the first line that starts with a number; blank lines are dropped.
+    Data begin at the first line that starts with a number; blank lines and comments among
+    them are dropped.
     """
+    texts = read_texts(path)
     header: list[Line] = []
-    data: list[Line] = []
-    for line in lines:
-        if not line.text.strip():
+    start = len(texts)
+    for i, text in enumerate(texts):
+        line = Line(i + 1, text)
+        if not text.strip():
             continue
-        if is_comment(line):
-            header.append(line)
-        elif data or is_number(line.cells(find_delimiter(line))[0]):
-            data.append(line)
-        else:
-            header.append(line)
-    if not data:
+        if not is_comment(line) and is_number(line.cells(find_delimiter(line))[0]):
+            start = i
+            break
+        header.append(line)
+    numbers = [
+        i
+        for i, text in enumerate(texts[start:], start=start + 1)
+        if (stripped := text.lstrip()) and not stripped.startswith(COMMENT_MARKS)
+    ]
+    if not numbers:
         raise DataFileError(
             path,
             "expected lines of numbers, found none",
             "Give columns of numbers separated by commas, semicolons, tabs or spaces.",
         )
-    return header, data
+    return header, Rows(numbers, [texts[i - 1] for i in numbers])
 
 
 def read_numbers(
-    path: str | Path, data: Sequence[Line], names: Sequence[str] | None = None
+    path: str | Path, data: Rows, names: Sequence[str] | None = None
 ) -> np.ndarray:
     """Return a rectangular block of numbers, shape (lines, columns); NaN passes.
 
@@ -142,7 +169,7 @@ def read_numbers(
     ----------
     path : str or Path
         For the error message.
-    data : sequence of Line
+    data : Rows
         Lines that hold numbers and nothing else.
     names : sequence of str, optional
         Column names for the error message; numbers from 1 by default.
@@ -152,11 +179,9 @@ def read_numbers(
     DataFileError
         Naming the first line and column that is not a number or is missing.
     """
-    delimiter = find_delimiter(data[0])
+    delimiter = find_delimiter(data.first)
     try:
-        block = np.loadtxt(
-            [line.text for line in data], delimiter=delimiter, comments=None, ndmin=2
-        )
+        block = np.loadtxt(data.texts, delimiter=delimiter, comments=None, ndmin=2)
     except ValueError:
         block = None
     if block is not None and not np.isinf(block).any():
@@ -166,14 +191,14 @@ def read_numbers(
 
 def _first_fault(
     path: str | Path,
-    data: Sequence[Line],
+    data: Rows,
     delimiter: str | None,
     names: Sequence[str] | None,
 ) -> DataFileError:
     """Locate what made a block of numbers unreadable."""
-    width = len(data[0].cells(delimiter))
+    width = len(data.first.cells(delimiter))
     cure = "Columns are separated by comma, semicolon, tab or space; decimals have a point."
-    for line in data:
+    for line in map(Line, data.numbers, data.texts):
         cells = line.cells(delimiter)
         for i, cell in enumerate(cells):
             if not is_number(cell) or np.isinf(float(cell)):
@@ -182,7 +207,7 @@ def _first_fault(
                 return DataFileError(path, problem, cure, line=line.number, column=name)
         if len(cells) != width:
             problem = (
-                f"expected {width} columns as in line {data[0].number}, got {len(cells)}"
+                f"expected {width} columns as in line {data.first.number}, got {len(cells)}"
             )
             return DataFileError(
                 path, problem, "The row is truncated or has extra cells.", line=line.number

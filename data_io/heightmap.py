@@ -1,6 +1,7 @@
 """Height maps: NumPy arrays, text matrices, x, y, z lists, x3p, and instrument formats."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,10 @@ import numpy as np
 from data_io._text import (
     LENGTH_UNITS,
     Line,
+    Rows,
     header_units,
     normalise_unit,
     read_bytes,
-    read_lines,
     read_numbers,
     split_header,
     unit_factor,
@@ -150,7 +151,7 @@ def _read_any_text(path: Path, spacing: Spacing | None, unit: str | None) -> Hei
 
 
 def _read_text(path: Path, spacing: Spacing | None, unit: str | None) -> HeightMap:
-    header, data = split_header(path, read_lines(path))
+    header, data = split_header(path)
     names = _list_columns(header)
     if names is not None:
         return _read_list(path, header, data, names, spacing, unit)
@@ -182,7 +183,7 @@ def _list_columns(header: list[Line]) -> list[str] | None:
 def _read_list(
     path: Path,
     header: list[Line],
-    data: list[Line],
+    data: Rows,
     names: list[str],
     spacing: Spacing | None,
     unit: str | None,
@@ -191,7 +192,7 @@ def _read_list(
     columns = read_numbers(path, data, names)
     if columns.shape[1] != 3:
         problem = f"expected three columns x, y, z, got {columns.shape[1]}"
-        raise DataFileError(path, problem, "Keep three.", line=data[0].number)
+        raise DataFileError(path, problem, "Keep three.", line=data.numbers[0])
     units = header_units(header[-1].text) if header else []
     if not units and unit is None:
         warn_missing_unit(path)
@@ -208,7 +209,7 @@ def _read_list(
         raise DataFileError(path, problem, "Leave the argument out.")
     factors = [unit_factor(name) for name in (units or [unit or "um"])]
     columns = columns * np.broadcast_to(factors, (3,))
-    lines = [line.number for line in data]
+    lines = data.numbers
     (i, dx, nx), (j, dy, ny) = (
         _grid_index(path, columns[:, k], lines, "xy"[k]) for k in range(2)
     )
@@ -225,7 +226,7 @@ def _read_list(
 
 
 def _grid_index(
-    path: Path, values: np.ndarray, lines: list[int], axis: str
+    path: Path, values: np.ndarray, lines: Sequence[int], axis: str
 ) -> tuple[np.ndarray, float, int]:
     """Return grid index of each coordinate, grid step and number of nodes."""
     if not np.isfinite(values).all():

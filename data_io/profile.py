@@ -1,6 +1,7 @@
 """Surface profiles z(x): the container and the reader of text files."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +15,6 @@ from data_io._text import (
     find_delimiter,
     header_units,
     read_bytes,
-    read_lines,
     read_numbers,
     split_header,
     unit_factor,
@@ -151,15 +151,15 @@ def read_profile(path: str | Path, *, unit: str | tuple[str, str] | None = None)
     if Path(path).suffix.lower() in INSTRUMENT_SUFFIXES:
         x, z = read_instrument_profile(path)
         return build_profile(path, x[np.isfinite(z)], z[np.isfinite(z)])
-    header, data = split_header(path, read_lines(path))
-    names, column_x, column_z = _columns(path, header, data[0])
+    header, data = split_header(path)
+    names, column_x, column_z = _columns(path, header, data.first)
     block = read_numbers(path, data, names)
     factor_x, factor_z = _factors(path, header, unit, names, column_x, column_z)
     return build_profile(
         path,
         block[:, column_x] * factor_x,
         block[:, column_z] * factor_z,
-        lines=[line.number for line in data],
+        lines=data.numbers,
     )
 
 
@@ -177,7 +177,7 @@ def _read_x3p_profile(path: str | Path) -> Profile:
 
 
 def build_profile(
-    path: str | Path, x: np.ndarray, z: np.ndarray, *, lines: list[int] | None = None
+    path: str | Path, x: np.ndarray, z: np.ndarray, *, lines: Sequence[int] | None = None
 ) -> Profile:
     """Make a Profile of file content, naming the line of a point that does not fit."""
 

@@ -30,7 +30,7 @@ from pathlib import Path
 import numpy as np
 
 from data_io._frames import rotation
-from data_io._text import Line, is_comment, read_numbers
+from data_io._text import Line, Rows, is_comment, read_numbers
 from data_io.goniometer.scan import ELEMENTS, Scan
 from pbrdf.errors import DataFileError
 
@@ -53,7 +53,7 @@ def read(path: Path, lines: list[Line]) -> Scan:
     if len(content) < 2:
         problem = "expected rows below the header, found none"
         raise DataFileError(path, problem, "The file is truncated.")
-    table = read_numbers(path, content[1:], names)
+    table = read_numbers(path, Rows.of(content[1:]), names)
     numbers = [line.number for line in content[1:]]
     if table.shape[1] != len(names):
         problem = f"expected {len(names)} cells as in the header, got {table.shape[1]}"

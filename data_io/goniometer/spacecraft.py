@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io._text import Line, is_comment, read_numbers
+from data_io._text import Line, Rows, is_comment, read_numbers
 from data_io.goniometer.scan import Scan
 from pbrdf.errors import DataFileError
 
@@ -32,7 +32,7 @@ def read(path: Path, lines: list[Line]) -> Scan:
     if not data:
         problem = "expected rows below the comments, found none"
         raise DataFileError(path, problem, "The file is truncated.")
-    table = read_numbers(path, data, _COLUMNS)
+    table = read_numbers(path, Rows.of(data), _COLUMNS)
     numbers = [line.number for line in data]
     if table.shape[1] != len(_COLUMNS):
         problem = f"expected {len(_COLUMNS)} columns, got {table.shape[1]}"

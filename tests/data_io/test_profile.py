@@ -33,6 +33,7 @@ def write(folder, text, name="edge.csv"):
         ("  0  1.5\n  1 -2.0\n\n  3  0.25\n", "um"),
         ("0\t1500\n0.001\t-2000\n0.003\t250\n", ("mm", "nm")),
         ("x_um,z_um\n3,0.25\n1,-2\n0,1.5\n", None),
+        ("x_nm,z_um\n0,1.5\n# dust here\n\n1000,-2\n3000,0.25\n# end [mm]\n", None),
     ],
     ids=[
         "own",
@@ -44,6 +45,7 @@ def write(folder, text, name="edge.csv"):
         "spaces",
         "two units",
         "right to left",
+        "comments among rows",
     ],
 )
 def test_layouts_and_units_give_the_same_profile(tmp_path, text, unit):
