@@ -1,4 +1,4 @@
-"""Surface profiles from micrographs of an edge, with the blur and grain of the camera undone."""
+"""Surface profiles from micrographs of an edge, with blur and grain undone."""
 
 import warnings
 from dataclasses import dataclass, field
@@ -44,11 +44,11 @@ class EdgeProfile(Profile):
     quality : ndarray, shape (n,)
         Likeness of each column to a blurred step, 0 to 1. [1]
     overhang : ndarray of bool, shape (n,)
-        True where the material overhangs: the outermost border is taken there, as seen along
-        the normal.
+        True where the material overhangs: the outermost border is taken there, as seen
+        along the normal.
     pixels : ndarray, shape (m, 2)
-        Row and column of the edge in the picture before restoration; pixel centres are whole
-        numbers. [pixels]
+        Row and column of the edge in the picture before restoration; pixel centres are
+        whole numbers. [pixels]
     um_per_pixel : float
         Scale. [um]
     threshold : float
@@ -116,8 +116,8 @@ def read_profile_image(
     overlay_path : str or Path, optional
         Write the picture with the edges drawn in, to check by eye.
     edge : int, optional
-        Which edge, in the order of `read_profile_images`, if the picture shows several; else
-        the longest is taken, with a warning.
+        Which edge, in the order of `read_profile_images`, if the picture shows several;
+        else the longest is taken, with a warning.
 
     Returns
     -------
@@ -185,8 +185,8 @@ def read_profile_images(
         Length written at the scale bar; the bar is then searched and measured. [um]
     material : {"auto", "dark", "bright"}
         Which phase is the sample. It decides the sign of z and which side overhangs. "auto"
-        takes the phase that the picture's ground surrounds, else the lower (of upright edges
-        the right) one.
+        takes the phase that the picture's ground surrounds, else the lower (of upright
+        edges the right) one.
     direction : {"auto", "horizontal", "vertical"}
         How the edges run.
     crop : (top, bottom, left, right), optional
@@ -222,7 +222,7 @@ def read_profile_images(
         ("direction", direction, ("auto", "horizontal", "vertical")),
     ):
         if value not in known:
-            msg = f"{name} must be one of {', '.join(known)}, got {value!r}. Use one of these."
+            msg = f"{name} must be {', '.join(known)}, got {value!r}. Use one of these."
             raise ValueError(msg)
     box = _box(path, grey, crop)
     part = grey[box[0] : box[1], box[2] : box[3]]
@@ -350,7 +350,8 @@ def _fault(trace: edges.Trace) -> str | None:
         return f"found one that overhangs along {overhang:.0%} of its length"
     tilt = np.arctan(np.polyfit(trace.columns, trace.height, 1)[0])
     if abs(tilt) > MAX_TILT:
-        return f"found one turned by {np.rad2deg(abs(tilt)):.0f} degrees: turn the picture first"
+        degrees = np.rad2deg(abs(tilt))
+        return f"found one turned by {degrees:.0f} degrees: turn the picture first"
     return None
 
 
@@ -477,9 +478,10 @@ def _remarks(
 ) -> tuple[str, ...]:
     """Say in words what may matter to the statistics of this profile."""
     remarks = []
-    if trace.overhang.mean() > 0.002:
+    overhang = float(trace.overhang.mean())
+    if overhang > 0.002:
         remarks.append(
-            f"{trace.overhang.mean():.1%} of the columns overhang: the outermost border is taken"
+            f"{overhang:.1%} of the columns overhang: the outermost border is taken"
         )
     if good.mean() < 0.98:
         remarks.append(

@@ -71,14 +71,14 @@ class Trace:
 
 
 def segment(phase: np.ndarray, noise: float) -> np.ndarray:
-    """Return the mask of the bright phase after just enough smoothing to quench the grain."""
+    """Return the mask of the bright phase, smoothed just enough to quench the grain."""
     # Smoothing by s pixels divides white noise by 2 sqrt(pi) s; 10 % of the step is safe
     width = float(np.clip(noise / (0.1 * 2 * np.sqrt(np.pi)), 1.0, 6.0))
     return ndimage.gaussian_filter(phase, width) > 0.5
 
 
 def drop_dust(mask: np.ndarray, min_span: float) -> np.ndarray:
-    """Fill pieces and holes that span less than this part of the rows and of the columns."""
+    """Fill pieces and holes that span less than this part of rows and of columns."""
     rows, columns = mask.shape
     cleaned = mask.copy()
     for value in (True, False):
@@ -101,7 +101,7 @@ def erase_dust(phase: np.ndarray, mask: np.ndarray, cleaned: np.ndarray) -> np.n
 
 
 def find_bodies(material: np.ndarray, min_columns: int) -> list[Body]:
-    """Return the sides of all connected pieces that span `min_columns` inside the picture."""
+    """Return the sides of all pieces that span `min_columns` inside the picture."""
     bodies = []
     labels, count = ndimage.label(material)
     for label in range(1, count + 1):
@@ -169,9 +169,9 @@ def trace(phase: np.ndarray, body: Body, clearance: np.ndarray) -> Trace:
     """Locate one edge by the amount of material in a window around it, column by column.
 
     The height of a column of material is the sum of its pixels' coverage. A picture blurred
-    by a kernel of width σ holds the same sum of the heights blurred along the edge, whatever
-    their slope: no curvature shift as a threshold has, and grain adds linearly, so that sums
-    beside the edge measure its noise.
+    by a kernel of width σ holds the same sum of the heights blurred along the edge,
+    whatever their slope: no curvature shift as a threshold has, and grain adds linearly, so
+    that sums beside the edge measure its noise.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def _gather(
 def _step(
     scaled: np.ndarray, distance: np.ndarray, within: np.ndarray, slope: np.ndarray
 ) -> tuple[float, np.ndarray]:
-    """Return the width of the mean step through the edge, and each column's likeness to it."""
+    """Return the width of the mean step, and each column's likeness to it."""
     gentle = within & (slope < np.quantile(slope, 0.9) + 1e-9)
     d, s = distance[gentle], scaled[gentle]
     bins = np.arange(-20, 20.01, 0.25)

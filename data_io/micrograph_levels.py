@@ -44,8 +44,8 @@ class Levels:
 def load_grey(path: str | Path) -> tuple[np.ndarray, str]:
     """Read an image file; return grey levels in [0, 1] and the name of the channel used.
 
-    Of a colour picture the channel (grey, red, green or blue) is taken whose histogram falls
-    most clearly into two classes.
+    Of a colour picture the channel (grey, red, green or blue) is taken whose histogram
+    falls most clearly into two classes.
     """
     from skimage import color, util
 
@@ -120,8 +120,8 @@ def _separability(channel: np.ndarray) -> float:
 def find_annotation_band(grey: np.ndarray) -> tuple[int, int]:
     """Return (first, last) row of the picture without a text band at top or bottom.
 
-    Electron microscopes add a band of uniform ground with text. Its border is straight to the
-    pixel, and it holds writing of high contrast; a silhouette has neither.
+    Electron microscopes add a band of uniform ground with text. Its border is straight to
+    the pixel, and it holds writing of high contrast; a silhouette has neither.
     """
     rows = grey.shape[0]
     for flipped in (False, True):
@@ -145,14 +145,16 @@ def find_annotation_band(grey: np.ndarray) -> tuple[int, int]:
 def flatten(grey: np.ndarray) -> Levels | None:
     """Fit smooth dark and bright levels to a picture of two phases and scale by them.
 
-    Both levels are quadratic polynomials of the position, fitted to the pixels of their class
-    away from the border; classes and levels are found in turn, as by Ridler and Calvard, from
-    a threshold of the whole picture and from one for each strip of columns, and the better
-    result is kept. Returns None for a picture without contrast.
+    Both levels are quadratic polynomials of the position, fitted to the pixels of their
+    class away from the border; classes and levels are found in turn, as by Ridler and
+    Calvard,
+    from a threshold of the whole picture and from one for each strip of columns, and the
+    better result is kept. Returns None for a picture without contrast.
 
     References
     ----------
-    .. [1] T. W. Ridler, S. Calvard, Picture thresholding using an iterative selection method,
+    .. [1] T. W. Ridler, S. Calvard, Picture thresholding using an iterative selection
+    method,
        IEEE Trans. Syst. Man Cybern. 8 (1978) 630.
     """
     from skimage.filters import threshold_otsu
@@ -169,7 +171,8 @@ def flatten(grey: np.ndarray) -> Levels | None:
     dark, bright, explained = max(fits, key=lambda fit: fit[2])
     contrast = bright - dark
     phase = (grey - dark) / contrast
-    # Differences of neighbours hold the grain alone; their median absolute value ignores edges
+    # Differences of neighbours hold the grain alone; their median absolute value ignores
+    # edges
     noise = np.median(np.abs(np.diff(phase[::2], axis=1))) / (0.6745 * np.sqrt(2))
     return Levels(
         phase=phase,

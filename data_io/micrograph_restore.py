@@ -39,13 +39,14 @@ class Restored:
 def restore(height: np.ndarray, grain: np.ndarray, step_width: float) -> Restored:
     """Give an edge the spectrum that it had before blur and grain.
 
-    The measured spectrum is P = G² S + N, with G = exp(-k² σ² / 2) the transfer function of the
-    blur along the edge and N the noise spectrum, measured on the grain beside the edge. Each
-    cosine is multiplied by sqrt(1 - N / P) / G, which gives the expected spectrum S whatever
-    its form: a Wiener filter would leave the slope too small, division by G alone too large.
+    The measured spectrum is P = G² S + N, with G = exp(-k² σ² / 2) the transfer function of
+    the blur along the edge and N the noise spectrum, measured on the grain beside the edge.
+    Each cosine is multiplied by sqrt(1 - N / P) / G, which gives the expected spectrum S
+    whatever its form: a Wiener filter would leave the slope too small, division by G alone
+    too large.
 
-    The width of the step through the edge holds, beside the blur, the heights that blur took
-    away (Var z before less Var z after) and the noise: σ is found with both taken off.
+    The width of the step through the edge holds, beside the blur, the heights that blur
+    took away (Var z before less Var z after) and the noise: σ is found with both taken off.
 
     Parameters
     ----------

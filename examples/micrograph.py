@@ -206,7 +206,8 @@ def main() -> None:
     arguments = parser.parse_args()
     edge = make_micrograph(arguments.path, arguments.seed)
     print(
-        f"{arguments.path}: {Camera().um_per_pixel} um a pixel, height_rms {edge.height_rms} um, "
+        f"{arguments.path}: {Camera().um_per_pixel} um a pixel, "
+        f"height_rms {edge.height_rms} um, "
         f"corr_length {edge.corr_length} um, slope_rms {edge.slope_rms:.4f}"
     )
 

@@ -11,6 +11,7 @@ from fitting.fit import fit
 
 if TYPE_CHECKING:
     from fitting.aperture import Aperture
+    from fitting.drop_silhouette import ContactAngle, contact_angle
     from fitting.estimate import Estimate
     from fitting.likelihood import LikelihoodProfile, profile_likelihood
     from fitting.model_comparison import Comparison, FTest, compare, f_test
@@ -25,6 +26,7 @@ __all__ = [
     "PARAMETERS",
     "Aperture",
     "Comparison",
+    "ContactAngle",
     "Estimate",
     "FTest",
     "FitResult",
@@ -33,6 +35,7 @@ __all__ = [
     "SimulatedModel",
     "SurfaceStatistics",
     "compare",
+    "contact_angle",
     "f_test",
     "fit",
     "profile_likelihood",
@@ -41,6 +44,7 @@ __all__ = [
 
 _MODULES = {
     "aperture": ("Aperture",),
+    "drop_silhouette": ("ContactAngle", "contact_angle"),
     "estimate": ("Estimate",),
     "likelihood": ("LikelihoodProfile", "profile_likelihood"),
     "model_comparison": ("Comparison", "FTest", "compare", "f_test"),

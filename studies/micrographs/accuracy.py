@@ -16,7 +16,7 @@ SLOPE_RMS = 0.252
 
 
 def slope_rms(x: np.ndarray, z: np.ndarray) -> float:
-    """Slope rms of the cubic spline: differences would lose 1 % at 10 pixels a length. [1]"""
+    """Slope rms of the cubic spline: differences lose 1 % at 10 pixels a length. [1]"""
     return float(np.std(CubicSpline(x, z)(x, 1)))
 
 
@@ -109,8 +109,9 @@ def main() -> None:
             mean = {key: np.mean([row[key] for row in rows]) for key in rows[0]}
             spread = {key: 100 * np.std([row[key] for row in rows]) for key in rows[0]}
             print(
-                f"{corr:4.0f} {blur:5.1f} {100 * grain:5.0f} {100 * light:5.0f} {tilt:5.1f} | "
-                f"{mean['raw slope']:10.3f} | {mean['slope']:7.3f} {spread['slope']:8.1f} | "
+                f"{corr:4.0f} {blur:5.1f} {100 * grain:5.0f} {100 * light:5.0f} "
+                f"{tilt:5.1f} | {mean['raw slope']:10.3f} | "
+                f"{mean['slope']:7.3f} {spread['slope']:8.1f} | "
                 f"{mean['height']:6.3f} {spread['height']:7.1f} | {mean['error']:8.3f} | "
                 f"{mean['blur']:.3f}| {mean['tilt']:+.3f}"
             )

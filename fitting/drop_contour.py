@@ -1,0 +1,217 @@
+"""Contour and baseline of a drop in a silhouette, to a fraction of a pixel."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+# A baseline leans less than this against the rows. [rad]
+MAX_LEAN = np.deg2rad(20)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DropContour:
+    """The border of a drop above its baseline.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        Along the baseline from the left contact, and above it; from left to right along the
+        contour. [pixels]
+    baseline : ndarray, shape (2, 2)
+        Row and column of the left and of the right contact point. [pixels]
+    lean : float
+        Counter-clockwise angle of the baseline with the rows. [rad]
+    lean_stderr : float
+        Its standard error. [rad]
+    offset_stderr : float
+        Standard error of the baseline's height. [pixels]
+    blur : float
+        Standard deviation of the border's blur. [pixels]
+    """
+
+    points: np.ndarray
+    baseline: np.ndarray
+    lean: float
+    lean_stderr: float
+    offset_stderr: float
+    blur: float
+
+
+def find_drop(grey: np.ndarray, baseline: np.ndarray | None) -> DropContour | None:
+    """Return the largest drop that stands on a straight line, or None."""
+    from skimage.filters import threshold_otsu
+    from skimage.measure import find_contours
+
+    first = ndimage.gaussian_filter(grey, 1.0)
+    if np.ptp(first) < 0.02:
+        return None
+    level = threshold_otsu(first)
+    bright = first > level
+    level = (np.median(first[bright]) + np.median(first[~bright])) / 2
+    contrast = np.median(first[bright]) - np.median(first[~bright])
+    if contrast < 0.02:
+        return None
+    rows, columns = np.flatnonzero(bright.any(axis=1)), np.flatnonzero(bright.any(axis=0))
+    # A lamp may light only a part of a large picture
+    top, left = max(rows[0] - 20, 0), max(columns[0] - 20, 0)
+    part = first[top : rows[-1] + 20, left : columns[-1] + 20]
+    down, right = np.gradient(part)
+    drops = []
+    for contour in find_contours(part, level):
+        if len(contour) < 60:
+            continue
+        # Towards the bright side, in the frame x to the right and y up
+        normal = np.stack(
+            [
+                ndimage.map_coordinates(right, contour.T, order=1),
+                -ndimage.map_coordinates(down, contour.T, order=1),
+            ],
+            axis=1,
+        )
+        xy = np.stack([contour[:, 1] + left, -(contour[:, 0] + top)], axis=1)
+        given = None if baseline is None else np.stack([baseline[:, 1], -baseline[:, 0]], 1)
+        drop = _drop_on_line(xy, normal, contrast, given)
+        if drop is not None:
+            drops.append(drop)
+    return max(drops, key=lambda drop: np.ptp(drop.points[:, 0]), default=None)
+
+
+def _drop_on_line(
+    xy: np.ndarray, normal: np.ndarray, contrast: float, given: np.ndarray | None
+) -> DropContour | None:
+    """Find a baseline in one contour, and the bulge over it."""
+    steepness = np.hypot(*normal.T)
+    upward = normal[:, 1] > np.cos(MAX_LEAN) * steepness
+    candidates = upward.copy()
+    for _ in range(4):
+        if given is None:
+            line = _straightest_line(xy[candidates])
+        else:
+            direction = given[1] - given[0]
+            line = (given[0], direction * np.sign(direction[0]) / np.hypot(*direction))
+        if line is None:
+            return None
+        origin, direction = line
+        along = (xy - origin) @ direction
+        above = (xy - origin) @ np.array([-direction[1], direction[0]])
+        flank = upward & (np.abs(above) < 2.5) if given is None else np.abs(above) < 2.5
+        run = _bulge(along, above, flank, normal[:, 1] > 0)
+        if run is not None:
+            return _measure(xy, flank, run, steepness, contrast, given)
+        if given is not None:
+            return None
+        # The straightest part was not a baseline with a drop on it, so look elsewhere
+        candidates &= np.abs(above) > 4
+        if np.count_nonzero(candidates) < 40:
+            return None
+    return None
+
+
+def _straightest_line(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return a point and the direction of the line near most points (RANSAC)."""
+    if len(xy) < 40:
+        return None
+    rng = np.random.default_rng(0)
+    pairs = rng.integers(0, len(xy), (600, 2))
+    span = np.ptp(xy[:, 0])
+    best, best_count = None, 0
+    sample = xy[:: max(1, len(xy) // 3000)]
+    for i, j in pairs:
+        step = xy[j] - xy[i]
+        if abs(step[0]) < 0.1 * span or abs(np.arctan2(step[1], abs(step[0]))) > MAX_LEAN:
+            continue
+        direction = step * np.sign(step[0]) / np.hypot(*step)
+        distance = np.abs((sample - xy[i]) @ np.array([-direction[1], direction[0]]))
+        count = np.count_nonzero(distance < 1.5)
+        if count > best_count:
+            best, best_count = (xy[i], direction), count
+    if best is None:
+        return None
+    origin, direction = best
+    for _ in range(3):
+        near = np.abs((xy - origin) @ np.array([-direction[1], direction[0]])) < 2.0
+        origin = xy[near].mean(axis=0)
+        direction = np.linalg.svd(xy[near] - origin, full_matrices=False)[2][0]
+        direction = direction * np.sign(direction[0])
+    return origin, direction
+
+
+def _bulge(
+    along: np.ndarray, above: np.ndarray, flank: np.ndarray, bright_above: np.ndarray
+) -> np.ndarray | None:
+    """Return the indices of the highest run between two flanks with brightness over it."""
+    if np.count_nonzero(flank) < 20:
+        return None
+    start = int(np.argmax(flank))
+    order = np.roll(np.arange(along.size), -start)
+    closed = np.hypot(along[0] - along[-1], above[0] - above[-1]) < 1.5
+    labels, _ = ndimage.label(~flank[order])
+    best: np.ndarray | None = None
+    best_size = 0.0
+    for box in ndimage.find_objects(labels):
+        part = order[box[0]]
+        top = int(part[np.argmax(above[part])])
+        height, width = above[top], np.ptp(along[part])
+        # The run through the ends of an open contour has no second flank
+        open_ended = box[0].stop == order.size and not closed
+        if height < 5 or width < 15 or not bright_above[top] or open_ended:
+            continue
+        if np.median(above[part]) > 0 and height * width > best_size:
+            best, best_size = part, float(height * width)
+    return best
+
+
+def _measure(
+    xy: np.ndarray,
+    flank: np.ndarray,
+    run: np.ndarray,
+    steepness: np.ndarray,
+    contrast: float,
+    given: np.ndarray | None,
+) -> DropContour | None:
+    """Fit the baseline to the flanks beside the drop and give its points in that frame."""
+    first, last = xy[run[0]], xy[run[-1]]
+    if first[0] > last[0]:
+        run, first, last = run[::-1], last, first
+    width = last[0] - first[0]
+    # The substrate next to the drop counts; far away it may end or bend
+    near = flank & (xy[:, 0] > first[0] - 1.5 * width) & (xy[:, 0] < last[0] + 1.5 * width)
+    # A Gaussian blur of width s has the steepest slope contrast / (s sqrt(2 pi)); the
+    # smoothing before the contour was found is part of it
+    blur = contrast / np.sqrt(2 * np.pi) / np.median(steepness[run])
+    # Next to the contact the drop's blur lifts the substrate's contour
+    gap = min(6 * blur, 0.2 * width)
+    sides = [near & (xy[:, 0] < first[0] - gap), near & (xy[:, 0] > last[0] + gap)]
+    middle = (first[0] + last[0]) / 2
+    if given is None:
+        if min(np.count_nonzero(side) for side in sides) < 8:
+            return None
+        ground = xy[sides[0] | sides[1]]
+        for _ in range(3):
+            slope, level = np.polyfit(ground[:, 0] - middle, ground[:, 1], 1)
+            residual = ground[:, 1] - slope * (ground[:, 0] - middle) - level
+            spread = 1.4826 * np.median(np.abs(residual)) + 0.02
+            ground = ground[np.abs(residual) < 3.5 * spread]
+        # Neighbouring points share blur and roughness: one in ten is independent
+        count = max(len(ground) / 10, 3)
+        lean_stderr = spread / np.sqrt(count) / np.std(ground[:, 0])
+        offset_stderr = spread / np.sqrt(count) + 0.02
+    else:
+        slope = (given[1, 1] - given[0, 1]) / (given[1, 0] - given[0, 0])
+        level = given[0, 1] + slope * (middle - given[0, 0])
+        lean_stderr, offset_stderr = 0.0, 0.5
+    lean = float(np.arctan(slope))
+    direction = np.array([np.cos(lean), np.sin(lean)])
+    origin = np.array([middle, level])
+    along = (xy[run] - origin) @ direction
+    above = (xy[run] - origin) @ np.array([-direction[1], direction[0]])
+    contacts = origin + np.outer([along[0], along[-1]], direction)
+    return DropContour(
+        points=np.stack([along, above], axis=1),
+        baseline=np.stack([-contacts[:, 1], contacts[:, 0]], axis=1),
+        lean=lean,
+        lean_stderr=float(lean_stderr),
+        offset_stderr=float(offset_stderr),
+        blur=float(blur),
+    )
