@@ -1,7 +1,7 @@
 """The project's own goniometer CSV: columns by name, units in the names."""
 
-import csv
 import difflib
+import re
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +82,7 @@ def _column_names(path: Path, header: Line) -> list[str]:
             problem = f"expected columns separated by commas, got {mark!r}"
             cure = "Write commas between columns and points in decimals."
             raise DataFileError(path, problem, cure, line=header.number)
-    names = [cell.strip().strip('"') for cell in header.text.split(",")]
+    names = _cells(header)
     for name in names:
         if name not in KNOWN:
             close = difflib.get_close_matches(name, KNOWN, n=1)
@@ -97,6 +97,11 @@ def _column_names(path: Path, header: Line) -> list[str]:
             raise DataFileError(path, problem, cure, line=header.number, column=name)
     _require_columns(path, set(names), header.number)
     return names
+
+
+def _cells(line: Line) -> list[str]:
+    """Return the cells of a line, without the quotes that spreadsheets put round them."""
+    return [re.sub(r'^"(.*)"$', r"\1", cell).strip() for cell in line.cells(",")]
 
 
 def _require_columns(path: Path, names: set[str], line: int) -> None:
@@ -122,15 +127,13 @@ def _require_columns(path: Path, names: set[str], line: int) -> None:
 def _table(path: Path, names: list[str], rows: list[Line]) -> np.ndarray:
     """Return the numbers of all rows, NaN where a cell is empty; shape (rows, columns)."""
     table = np.full((len(rows), len(names)), np.nan)
-    for i, (line, cells) in enumerate(
-        zip(rows, csv.reader(line.text for line in rows), strict=True)
-    ):
+    for i, line in enumerate(rows):
+        cells = _cells(line)
         if len(cells) != len(names):
             problem = f"expected {len(names)} cells as in the header, got {len(cells)}"
             cure = "The row is truncated, has extra cells, or decimals have commas."
             raise DataFileError(path, problem, cure, line=line.number)
-        for j, cell in enumerate(cells):
-            text = cell.strip()
+        for j, text in enumerate(cells):
             if not text:
                 continue
             if not is_number(text):

@@ -106,8 +106,8 @@ def test_out_of_plane_rows_have_no_view_angle(tmp_path):
 
 def test_units_gaps_comments_and_order_of_columns(tmp_path):
     text = (
-        "\ufeff# title\r\nDOLP,wavelength_nm,dphi_deg,theta_s_deg,theta_i_deg,M31\r\n"
-        " 0.25 ,532,-90,20,30,\r\n\r\n# half time\r\n,532,270,21,30,-0.001\r\n"
+        '\ufeff# title\r\n"DOLP",wavelength_nm,dphi_deg,theta_s_deg,theta_i_deg,M31\r\n'
+        ' "0.25" ,532,-90,20,30,\r\n\r\n# half time\r\n,532,270,21,30,-0.001\r\n'
     )
     scan = read_goniometer(write(tmp_path, text))
     assert_allclose(scan.wavelength, 0.532)
@@ -153,6 +153,7 @@ FULL = "theta_i_deg,theta_s_deg,dphi_deg,M00"
         (f"{VIEW},wavelength_um,wavelength_nm\n30,10,1,0.5,500\n", "expected one wavelength column"),
         # Cells
         (f"{VIEW}\n30,10,1\n30,20,n/a\n", "line 3, column M00: expected a number, got 'n/a'. Leave gaps"),
+        (f'{VIEW}\n30,10,1\n30,"20,1\n30,30,1\n', "line 3, column theta_view_deg: .*got '\"20'"),
         (f"{VIEW}\n30,10,1\n30,20\n", "line 3: expected 3 cells as in the header, got 2"),
         (f"{VIEW}\n30,10,1\n30,20,0,5\n", "line 3: expected 3 cells .*, got 4"),
         (f"{VIEW}\n30,10,1\n30,,2\n", "line 3, column theta_view_deg: expected a number in every row"),
