@@ -1,7 +1,7 @@
 """A scene: surface, substrate and what lies on it; and its TOML file."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,10 @@ INLINE_NODES = 4096
 
 _SURFACE_KEYS = {
     "gaussian": {"shape", "spacing_um", "corr_length_um", "slope_rms", "height_rms_um"},
-    "height_map": {"file", "heights_um", "spacing_um", "periodic"},
+    "height_map": {"file", "heights_um", "spacing_um", "periodic", "labels"},
     "flat": {"size_um"},
 }
-_SUBSTRATE_KEYS = {"material", "n", "kappa", "diffuse_albedo", "wavelength_um", "name"}
+_SUBSTRATE_KEYS = {"material", "materials", "n", "kappa", "diffuse_albedo", "wavelength_um", "name"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +34,9 @@ class Scene:
     ----------
     surface : HeightMap or GaussianSurface
         A fixed surface, or an ensemble of which realisations are drawn.
-    substrate : Material or str
-        Material under the surface, or its name in the library.
+    substrate : Material or str, or a sequence of them
+        Material under the surface, or its name in the library; several where the labels of a
+        HeightMap number them.
     contaminants : tuple
         What lies on the surface; none is known to this version.
 
@@ -54,13 +55,13 @@ class Scene:
     """
 
     surface: HeightMap | GaussianSurface
-    substrate: Material
+    substrate: Material | tuple[Material, ...]
     contaminants: tuple[Any, ...] = ()
 
     def __init__(
         self,
         surface: HeightMap | GaussianSurface,
-        substrate: Material | str,
+        substrate: Material | str | Sequence[Material | str],
         contaminants: tuple[Any, ...] = (),
     ) -> None:
         if not isinstance(surface, HeightMap | GaussianSurface):
@@ -75,10 +76,18 @@ class Scene:
                 "Only clean opaque surfaces are simulated."
             )
             raise ValueError(msg)
-        material = library.get(substrate) if isinstance(substrate, str) else substrate
+        single = isinstance(substrate, str | Material)
+        listed = [substrate] if single else list(substrate)
+        materials = tuple(library.get(m) if isinstance(m, str) else m for m in listed)
+        _check_labels(surface, materials)
         object.__setattr__(self, "surface", surface)
-        object.__setattr__(self, "substrate", material)
+        object.__setattr__(self, "substrate", materials[0] if single else materials)
         object.__setattr__(self, "contaminants", tuple(contaminants))
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """Materials of the substrate, in the order of the labels."""
+        return (self.substrate,) if isinstance(self.substrate, Material) else self.substrate
 
     def to_toml(self, path: str | Path | None = None) -> str:
         """TOML text of the scene, also written to `path` if given.
@@ -96,7 +105,11 @@ class Scene:
             heights_file = target.with_suffix(".npy")
         document = {
             "surface": _surface_table(self.surface, heights_file),
-            "substrate": _substrate_table(self.substrate),
+            "substrate": (
+                _substrate_table(self.substrate)
+                if isinstance(self.substrate, Material)
+                else {"materials": [_substrate_table(m) for m in self.substrate]}
+            ),
         }
         text = tomli_w.dumps(document)
         if path is not None:
@@ -104,6 +117,27 @@ class Scene:
             temporary.write_text(text, encoding="utf-8")
             temporary.replace(target)
         return text
+
+
+def _check_labels(
+    surface: HeightMap | GaussianSurface, materials: tuple[Material, ...]
+) -> None:
+    """Refuse labels that name no material, and materials that no label can name."""
+    for material in materials:
+        if not isinstance(material, Material):
+            msg = (
+                f"substrate must be a Material or the name of one, got "
+                f"{type(material).__name__}. Write Material(n, kappa)."
+            )
+            raise TypeError(msg)
+    labels = surface.labels if isinstance(surface, HeightMap) else None
+    highest = 0 if labels is None else int(labels.max())
+    if highest >= len(materials) or (labels is None and len(materials) != 1):
+        msg = (
+            f"substrate must have one material for each label, got {len(materials)} for labels "
+            f"up to {highest}. Give a list of materials and HeightMap(..., labels=)."
+        )
+        raise ValueError(msg)
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -157,6 +191,13 @@ def _check_keys(table: Mapping[str, Any], known: set[str], place: str, source: P
             )
 
 
+def _check_type(
+    table: Mapping[str, Any], key: str, kind: type, cure: str, source: Path
+) -> None:
+    if key in table and not isinstance(table[key], kind):
+        raise DataFileError(source, f"[surface]: {key!r} is {table[key]!r}", cure)
+
+
 def _pair(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
@@ -177,6 +218,8 @@ def _surface_table(surface: HeightMap | GaussianSurface, file: Path | None) -> d
         "spacing_um": list(surface.spacing),
         "periodic": surface.periodic,
     }
+    if surface.labels is not None:
+        table["labels"] = surface.labels.tolist()
     if surface.heights.size <= INLINE_NODES:
         return table | {"heights_um": surface.heights.tolist()}
     if file is None:
@@ -212,7 +255,7 @@ def _substrate_table(material: Material) -> dict[str, Any]:
 
 def _read_surface(table: dict[str, Any], source: Path) -> HeightMap | GaussianSurface:
     kind = table.pop("type", None)
-    if kind not in _SURFACE_KEYS:
+    if not isinstance(kind, str) or kind not in _SURFACE_KEYS:
         raise DataFileError(
             source, f"[surface]: type is {kind!r}", f"Known: {', '.join(_SURFACE_KEYS)}."
         )
@@ -236,6 +279,8 @@ def _read_surface(table: dict[str, Any], source: Path) -> HeightMap | GaussianSu
         )
     if "spacing_um" not in table:
         raise DataFileError(source, "[surface]: key 'spacing_um' is missing", "Give it.")
+    _check_type(table, "periodic", bool, "Write true or false.", source)
+    _check_type(table, "file", str, "Name a .npy file.", source)
     heights = table.get("heights_um")
     if heights is None:
         file = source.parent / table["file"]
@@ -247,12 +292,21 @@ def _read_surface(table: dict[str, Any], source: Path) -> HeightMap | GaussianSu
                 "Give a .npy file of heights [um], x first.",
             ) from error  # fmt: skip
     return HeightMap(
-        heights, _pair(table["spacing_um"]), periodic=bool(table.get("periodic", False))
+        heights,
+        _pair(table["spacing_um"]),
+        periodic=bool(table.get("periodic", False)),
+        labels=table.get("labels"),
     )
 
 
-def _read_substrate(table: dict[str, Any], source: Path) -> Material:
+def _read_substrate(table: dict[str, Any], source: Path) -> Material | list[Material]:
     _check_keys(table, _SUBSTRATE_KEYS, "substrate", source)
+    if "materials" in table:
+        return [_read_material(entry, source) for entry in table["materials"]]
+    return _read_material(table, source)
+
+
+def _read_material(table: dict[str, Any], source: Path) -> Material:
     if "material" in table:
         if len(table) > 1:
             raise DataFileError(

@@ -2,7 +2,7 @@
 
 Written from Born & Wolf (Fresnel amplitudes from Snell's law) and from the definition of
 the Stokes vector; shares no code and no formula of the package. The Mueller matrix of a
-path is found by sending four fields along it and measuring the Stokes vectors that come out.
+path is found by sending four fields along it and measuring the Stokes vectors behind it.
 """
 
 import cmath
@@ -64,7 +64,7 @@ def reflect_field(field, k, normal, n, kappa):
 
 
 def path_mueller(dir_i, normals, n, kappa=0.0, *, phi_i=0.0, phi_s=None):
-    """Mueller matrix (out, in) of a path over facets, in meridian frames, and its direction.
+    """Mueller matrix (out, in) of a path over facets, in meridian frames; its direction.
 
     `phi_i`, `phi_s` name the azimuths that stand for beams along z.
     """

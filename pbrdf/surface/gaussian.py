@@ -68,16 +68,21 @@ class GaussianSurface:
         for name in ("spacing", "corr_length", "slope_rms", "height_rms"):
             value = getattr(self, name)
             if value is not None:
-                require(
+                checked = require(
                     name,
                     value,
                     lambda v: (v > 0) & np.isfinite(v),
                     "be positive",
                     "Lengths are micrometres, slopes are tangents.",
                 )
-        if len(self.shape) != 2 or min(self.shape) < 8:
+                # Plain numbers, whatever NumPy type they came in: they go into files
+                plain = checked.tolist()
+                object.__setattr__(self, name, plain if checked.ndim == 0 else tuple(plain))
+        sides = np.asarray(self.shape)
+        if sides.shape != (2,) or (sides < 8).any() or (sides != np.floor(sides)).any():
             msg = f"shape must be (nx, ny) with at least 8 nodes each, got {self.shape}."
             raise ValueError(msg)
+        object.__setattr__(self, "shape", tuple(int(n) for n in sides))
         periods = np.asarray(self.shape) * self._steps
         if (periods < 4 * self._lengths).any():
             msg = (

@@ -23,6 +23,8 @@ class HeightMap:
         Grid steps dx, dy. [um]
     periodic : bool
         True if the surface repeats with period (nx dx, ny dy): node nx is node 0.
+    labels : array_like, optional, shape `cells`
+        Number of the material of each grid cell, where the surface has several.
 
     Raises
     ------
@@ -40,6 +42,7 @@ class HeightMap:
     heights: np.ndarray
     spacing: tuple[float, float]
     periodic: bool
+    labels: np.ndarray | None
 
     def __init__(
         self,
@@ -47,6 +50,7 @@ class HeightMap:
         spacing: float | tuple[float, float],
         *,
         periodic: bool = False,
+        labels: npt.ArrayLike | None = None,
     ) -> None:
         grid = np.array(heights, dtype=np.float64)
         if grid.ndim != 2 or min(grid.shape) < 2:
@@ -69,11 +73,17 @@ class HeightMap:
             "be positive [um]",
             "Give the grid step in micrometres, or (dx, dy).",
         )
+        if steps.shape not in ((), (2,)):
+            msg = f"spacing must be a number or (dx, dy) [um], got shape {steps.shape}."
+            raise ValueError(msg)
         pair = np.broadcast_to(steps, (2,))
         grid.setflags(write=False)
         object.__setattr__(self, "heights", grid)
         object.__setattr__(self, "spacing", (float(pair[0]), float(pair[1])))
         object.__setattr__(self, "periodic", bool(periodic))
+        object.__setattr__(self, "labels", None)
+        if labels is not None:
+            object.__setattr__(self, "labels", _material_numbers(labels, self.cells))
 
     def __repr__(self) -> str:
         nx, ny = self.heights.shape
@@ -122,3 +132,20 @@ class HeightMap:
             along_x = np.diff(self.heights, axis=0)
             along_y = np.diff(self.heights, axis=1)
         return along_x / dx, along_y / dy
+
+
+def _material_numbers(labels: npt.ArrayLike, cells: tuple[int, int]) -> np.ndarray:
+    """Check a label map: one whole number from 0 to 255 for each cell."""
+    numbers = require(
+        "labels", labels, lambda v: (v >= 0) & (v <= 255) & (v == np.floor(v)),
+        "be whole numbers in [0, 255]", "Number the materials from 0.",
+    )  # fmt: skip
+    if numbers.shape != cells:
+        msg = (
+            f"labels must have the shape of the cells {cells}, got {numbers.shape}. "
+            "A finite map of (nx, ny) nodes has (nx - 1, ny - 1) cells."
+        )
+        raise ValueError(msg)
+    table = numbers.astype(np.uint8)
+    table.setflags(write=False)
+    return table

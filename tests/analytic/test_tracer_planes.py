@@ -11,7 +11,7 @@ from tests.reference_optics import path_mueller, spherical
 RAYS = 640
 BINS = (31, 22)
 BREWSTER = {n: float(np.rad2deg(np.arctan(n))) for n in (1.333, 1.5)}
-# Glass, aluminium and a lossy dielectric in one run: a material that changes with wavelength
+# Glass, aluminium and a lossy dielectric as one material of three wavelengths
 WAVES = np.array([0.4, 0.5, 0.6])
 INDEX = np.array([1.5, 0.958, 1.9]), np.array([0.0, 6.69, 0.4])
 MATERIAL = Material.from_table(wavelength=WAVES, n=INDEX[0], kappa=INDEX[1])

@@ -232,7 +232,7 @@ def test_rays_that_leave_from_vertices_and_edges(seed, facet, corner, step_x, st
     z = heights[i, j] + slope[0] * u + slope[1] * v
     maxima, levels = block_maxima(heights, True)
     leave_rate = speed[2] - slope[0] * speed[0] - slope[1] * speed[1]
-    fate, ci, cj, found, cu, cv, cz = walk(
+    fate, ci, cj, found, _, _, cz = walk(
         heights, maxima, levels, heights.max(), True,
         i, j, facet, u, v, z, *speed, leave_rate, STEPS,
     )  # fmt: skip
