@@ -78,7 +78,9 @@ def _decode(path: Path) -> np.ndarray:
     if not path.is_file():
         raise DataFileError(path, "expected an image file, found none", "Check the path.")
     try:
-        image = np.asarray(io.imread(path))
+        # A decoder that refuses a file leaves it open; this closes it
+        with path.open("rb") as stream:
+            image = np.asarray(io.imread(stream))
     except Exception as error:  # each decoder behind imread has its own family of errors
         problem = (
             "expected a picture (PNG, TIFF, JPEG, BMP), got a file that none can decode"
