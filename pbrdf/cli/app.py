@@ -4,6 +4,7 @@ Commands import what they need when they run, so that `pbrdf --help` stays quick
 """
 
 import os
+import re
 import sys
 import warnings
 from collections.abc import Sequence
@@ -60,8 +61,9 @@ def dew() -> None:
     raise ValueError(msg)
 
 
-for _command_function in (pipeline, statistics, fit, simulate, sweep, plot, export):
-    app.command()(_command_function)
+COMMANDS = (pipeline, statistics, fit, simulate, sweep, plot, export)
+for function in COMMANDS:
+    app.command()(function)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -86,9 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 args=arguments or ["--help"], prog_name="pbrdf", standalone_mode=False
             )
         except typer.TyperException as error:
-            return _fail(
-                error, f"{_sentence(error)} See `pbrdf {_command(arguments)}--help`."
-            )
+            return _fail(error, _usage(error, arguments))
         except (ValueError, OSError) as error:
             return _fail(error, _sentence(error))
         except (KeyboardInterrupt, typer.Abort):
@@ -116,9 +116,16 @@ def _sentence(error: Exception) -> str:
     return text if text.endswith((".", "!", "?")) else f"{text}."
 
 
-def _command(arguments: Sequence[str]) -> str:
-    names = {command.name for command in app.registered_commands}
-    return next((f"{word} " for word in arguments if word in names), "")
+def _usage(error: typer.TyperException, arguments: Sequence[str]) -> str:
+    """Return what is wrong with the arguments, the value, and where help is."""
+    sentence = _sentence(error)
+    option = re.search(r"'(--[a-z-]+)'", sentence)
+    if option and option[1] in arguments[:-1]:
+        value = arguments[arguments.index(option[1]) + 1]
+        sentence = f"{sentence.rstrip('.')}, got {value!r}."
+    commands = {function.__name__ for function in COMMANDS}
+    name = next((f"{word} " for word in arguments if word in commands), "")
+    return f"{sentence} See `pbrdf {name}--help`."
 
 
 def _one_line_warning(message: Warning | str, *_: object, **__: object) -> None:

@@ -105,7 +105,7 @@ def changed(scene: "Scene", values: Mapping[str, float]) -> "Scene":
     ValueError
         If the scene has no such parameter, or a value is out of its range.
     """
-    from pbrdf import GaussianSurface, Scene
+    from pbrdf import GaussianSurface, Material, Scene
 
     changes: dict[str, dict[str, Any]] = {"surface": {}, "substrate": {}}
     for name, value in values.items():
@@ -117,6 +117,9 @@ def changed(scene: "Scene", values: Mapping[str, float]) -> "Scene":
             msg = "--vary needs a gaussian surface for that, got a height map. Vary n."
             raise ValueError(msg)
         surface = replace(surface, **changes["surface"])
+    if not isinstance(scene.substrate, Material):
+        msg = "--vary needs a substrate of one material, got several. Vary the surface."
+        raise ValueError(msg)
     substrate = replace(scene.substrate, **changes["substrate"])
     return Scene(surface, substrate, scene.contaminants)
 
