@@ -8,6 +8,7 @@ from pbrdf.analytic.named import (
     priest_germer,
     torrance_sparrow,
 )
+from pbrdf.analytic.slope_table import SlopeTable
 from pbrdf.analytic.tables import (
     GRAZING_FORMS,
     SHADOWING,
@@ -22,6 +23,7 @@ __all__ = [
     "VOLUME_FORMS",
     "HemisphericalReflectance",
     "MicrofacetModel",
+    "SlopeTable",
     "beard_maxwell",
     "emissivity",
     "generalised",

@@ -3,12 +3,14 @@
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from math import nan
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from pbrdf.analytic.geometry import flat_geometry
+from pbrdf.analytic.slope_table import SlopeTable
 from pbrdf.analytic.tables import (
     GRAZING_FORMS,
     SHADOWING,
@@ -19,7 +21,7 @@ from pbrdf.analytic.tables import (
 from pbrdf.errors import require
 from pbrdf.kernels import microfacet as kernel
 from pbrdf.kernels.shadowing import Shadowing
-from pbrdf.kernels.slopes import Roughness, slope_norm
+from pbrdf.kernels.slopes import GAUSSIAN, Roughness, slope_norm
 from pbrdf.kernels.volume import Diffuse
 from pbrdf.optics.materials import Material
 
@@ -39,8 +41,9 @@ class MicrofacetModel:
         Index of the facets.
     slope_rms : float or (float, float)
         Rms slope PER AXIS, along x and y where they differ. [1]
-    slope_distribution : str
-        A key of `pbrdf.analytic.SLOPE_DISTRIBUTIONS`.
+    slope_distribution : str or SlopeTable
+        A key of `pbrdf.analytic.SLOPE_DISTRIBUTIONS`, or measured slopes; these bring their
+        own slope_rms.
     shadowing : str
         A key of `pbrdf.analytic.SHADOWING`.
     specular_gain : float
@@ -81,8 +84,8 @@ class MicrofacetModel:
     """
 
     material: Material
-    slope_rms: float | tuple[float, float]
-    slope_distribution: str = "gaussian"
+    slope_rms: float | tuple[float, float] = nan
+    slope_distribution: str | SlopeTable = "gaussian"
     shadowing: str = "smith-correlated"
     specular_gain: float = 1.0
     diffuse_albedo: float = 0.0
@@ -95,16 +98,7 @@ class MicrofacetModel:
     grazing_form: str = "bounded"
 
     def __post_init__(self) -> None:
-        slopes = require(
-            "slope_rms", self.slope_rms, lambda v: (v > 0) & (v < 1e3), "be > 0 [1]",
-            "A smooth surface has no BRDF; the slope is a tangent, not an angle.",
-        )  # fmt: skip
-        if slopes.shape not in ((), (2,)):
-            msg = f"slope_rms must be one number or (x, y), got shape {slopes.shape}."
-            raise ValueError(msg)
-        pair = slopes.tolist()
-        object.__setattr__(self, "slope_rms", tuple(pair) if slopes.ndim else pair)
-        code_of(SLOPE_DISTRIBUTIONS, self.slope_distribution, "slope_distribution")
+        self._check_slopes()
         code_of(SHADOWING, self.shadowing, "shadowing")
         code_of(VOLUME_FORMS, self.volume_form, "volume_form")
         code_of(GRAZING_FORMS, self.grazing_form, "grazing_form")
@@ -122,6 +116,32 @@ class MicrofacetModel:
             require(name, getattr(self, name), lambda v: v >= 0, "be >= 0 [1]", "")
         for name in ("shadow_omega", "shadow_tau"):
             require(name, getattr(self, name), lambda v: v > 0, "be > 0 [rad]", "")
+
+    def _check_slopes(self) -> None:
+        """Check slope_rms and slope_distribution against each other."""
+        table = self.slope_distribution
+        if isinstance(table, SlopeTable):
+            if self.slope_rms != table.slope_rms and not np.isnan(self.slope_rms).all():
+                msg = "slope_rms must be left out where slope_distribution is a SlopeTable."
+                raise ValueError(msg)
+            if self.shadowing == "smith":
+                msg = (
+                    "shadowing must not be 'smith' over a SlopeTable: its numerator is "
+                    "that of a Gaussian. Use smith-uncorrelated or smith-correlated."
+                )
+                raise ValueError(msg)
+            object.__setattr__(self, "slope_rms", table.slope_rms)
+            return
+        code_of(SLOPE_DISTRIBUTIONS, table, "slope_distribution")
+        slopes = require(
+            "slope_rms", self.slope_rms, lambda v: (v > 0) & (v < 1e3), "be > 0 [1]",
+            "A smooth surface has no BRDF; the slope is a tangent, not an angle.",
+        )  # fmt: skip
+        if slopes.shape not in ((), (2,)):
+            msg = f"slope_rms must be one number or (x, y), got shape {slopes.shape}."
+            raise ValueError(msg)
+        pair = slopes.tolist()
+        object.__setattr__(self, "slope_rms", tuple(pair) if slopes.ndim else pair)
 
     def with_parameters(self, **changes: Any) -> "MicrofacetModel":
         """Copy with some parameters changed.
@@ -167,6 +187,8 @@ class MicrofacetModel:
         """
         n, kappa = self.material.indices(wavelength)
         shape, columns = flat_geometry(theta_i, theta_s, dphi, phi_i, n, kappa)
+        if isinstance(self.slope_distribution, SlopeTable):
+            return self._tabulated(self.slope_distribution, columns).reshape(*shape, 4, 4)
         size = columns[0].size
         # The kernel reads n and kappa with one stride
         if columns[4].size != columns[5].size:
@@ -175,11 +197,27 @@ class MicrofacetModel:
         _fill(columns, self._surface(), out)
         return out.reshape(*shape, 4, 4)
 
+    def _tabulated(self, table: SlopeTable, columns: list[np.ndarray]) -> np.ndarray:
+        """Matrices over measured slopes: the table gives densities and Lambda."""
+        size = columns[0].size
+        theta_i, theta_s, dphi, phi_i, n, kappa = (
+            np.broadcast_to(c, size).copy() for c in columns
+        )
+        slopes = np.empty((2, size))
+        kernel.fill_facet_slopes(theta_i, theta_s, dphi, phi_i, slopes)
+        out = np.empty((size, 4, 4))
+        kernel.fill_tabulated(
+            theta_i, theta_s, dphi, n, kappa, table.density_at(*slopes),
+            table.overhang(theta_i, phi_i), table.overhang(theta_s, phi_i + dphi),
+            self._surface(), out,
+        )  # fmt: skip
+        return out
+
     def _surface(self) -> kernel.Surface:
         """Numbers of the model as the kernels take them."""
-        law = SLOPE_DISTRIBUTIONS[self.slope_distribution].code
-        pair = self.slope_rms
-        slope_x, slope_y = pair if isinstance(pair, tuple) else (pair, pair)
+        name = self.slope_distribution
+        law = GAUSSIAN if isinstance(name, SlopeTable) else SLOPE_DISTRIBUTIONS[name].code
+        slope_x, slope_y = np.broadcast_to(np.asarray(self.slope_rms), 2).tolist()
         return kernel.Surface(
             Roughness(
                 law, slope_x, slope_y, slope_x == slope_y, slope_norm(law, slope_x, slope_y)

@@ -6,11 +6,17 @@ from math import cos, sin
 from . import jit
 from .facet import directions, mirror_facet, rotated_elements
 from .fresnel import facet_elements
-from .shadowing import shadowing_factor
+from .shadowing import TORRANCE_SPARROW, combined_overhangs, shadowing_factor
 from .slopes import slope_density
 from .volume import added_elements, base_radiance
 
-__all__ = ["Surface", "fill_brdf", "microfacet_brdf", "specular_elements"]
+__all__ = [
+    "Surface",
+    "fill_brdf",
+    "fill_facet_slopes",
+    "fill_tabulated",
+    "microfacet_brdf",
+]
 
 # rough, shadow, diffuse: the namedtuples of their modules
 Surface = namedtuple("Surface", "rough shadow specular_gain diffuse")
@@ -28,26 +34,28 @@ def facet_density(way, facet, rough):
 
 
 @jit
-def specular_elements(way, n, kappa, surface):
-    """Sixteen elements of the specular term of equation (20). [1/sr]"""
-    facet = mirror_facet(way)
-    strength = surface.specular_gain * facet_density(way, facet, surface.rough)
-    strength = strength * shadowing_factor(surface.shadow, way, facet, surface.rough)
+def brdf_rows(way, facet, strength, n, kappa, diffuse, radiance):
+    """Rows of strength times F', plus the terms (22) and (23). [1/sr]"""
     a, b, c, d = facet_elements(facet.cos_beta, facet.sin2_beta, n, kappa)
-    return rotated_elements(way, strength * a, strength * b, strength * c, strength * d)
-
-
-@jit
-def microfacet_brdf(way, n, kappa, surface, radiance):
-    """Rows of the Mueller BRDF of equation (24); radiance from `base_radiance`. [1/sr]"""
-    first, second, third, fourth = specular_elements(way, n, kappa, surface)
-    m00, m01, m10, m11, m22 = added_elements(way, n, kappa, surface.diffuse, radiance)
+    first, second, third, fourth = rotated_elements(
+        way, strength * a, strength * b, strength * c, strength * d
+    )
+    m00, m01, m10, m11, m22 = added_elements(way, n, kappa, diffuse, radiance)
     return (
         (first[0] + m00, first[1] + m01, first[2], first[3]),
         (second[0] + m10, second[1] + m11, second[2], second[3]),
         (third[0], third[1], third[2] + m22, third[3]),
         (fourth[0], fourth[1], fourth[2], fourth[3] + m22),
     )
+
+
+@jit
+def microfacet_brdf(way, n, kappa, surface, radiance):
+    """Rows of the Mueller BRDF of equation (24); radiance from `base_radiance`. [1/sr]"""
+    facet = mirror_facet(way)
+    strength = surface.specular_gain * facet_density(way, facet, surface.rough)
+    strength = strength * shadowing_factor(surface.shadow, way, facet, surface.rough)
+    return brdf_rows(way, facet, strength, n, kappa, surface.diffuse, radiance)
 
 
 @jit
@@ -65,6 +73,39 @@ def fill_brdf(theta_i, theta_s, dphi, phi_i, n, kappa, surface, out):
         if each_index:
             radiance = base_radiance(n[m], kappa[m], surface.diffuse)
         rows = microfacet_brdf(way, n[m], kappa[m], surface, radiance)
+        for i in range(4):
+            for j in range(4):
+                out[k, i, j] = rows[i][j]
+
+
+@jit
+def fill_facet_slopes(theta_i, theta_s, dphi, phi_i, out):
+    """Fill out[:, k] with the slopes of the mirroring facet of geometry k."""
+    for k in range(theta_i.size):
+        way = directions(theta_i[k], theta_s[k], dphi[k], cos(phi_i[k]), sin(phi_i[k]))
+        facet = mirror_facet(way)
+        out[0, k] = facet.slope_x
+        out[1, k] = facet.slope_y
+
+
+@jit
+def fill_tabulated(
+    theta_i, theta_s, dphi, n, kappa, density, lambda_i, lambda_s, surface, out
+):
+    """Fill out[k] as `fill_brdf`, with slope density and both Smith's Lambda given."""
+    for k in range(theta_i.size):
+        way = directions(theta_i[k], theta_s[k], dphi[k], 1.0, 0.0)
+        facet = mirror_facet(way)
+        inv_cos2 = 1.0 + facet.tan2_tilt
+        lit = density[k] * inv_cos2 * inv_cos2 / (4.0 * way.cos_i * way.cos_s)
+        rule = surface.shadow.rule
+        if rule > TORRANCE_SPARROW:
+            seen = combined_overhangs(rule, way, lambda_i[k], lambda_s[k])
+        else:
+            seen = shadowing_factor(surface.shadow, way, facet, surface.rough)
+        radiance = base_radiance(n[k], kappa[k], surface.diffuse)
+        strength = surface.specular_gain * lit * seen
+        rows = brdf_rows(way, facet, strength, n[k], kappa[k], surface.diffuse, radiance)
         for i in range(4):
             for j in range(4):
                 out[k, i, j] = rows[i][j]

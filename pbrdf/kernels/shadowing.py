@@ -16,6 +16,7 @@ __all__ = [
     "SMITH_UNCORRELATED",
     "TORRANCE_SPARROW",
     "Shadowing",
+    "combined_overhangs",
     "shadowing_factor",
 ]
 
@@ -69,6 +70,18 @@ def direction_weight(way):
 
 
 @jit
+def combined_overhangs(rule, way, lambda_i, lambda_s):
+    """Statistical factor of both Lambda, without Smith's numerator of 1967."""
+    if rule == SMITH_CORRELATED:
+        return 1.0 / (1.0 + lambda_i + lambda_s)
+    if rule == SMITH_DIRECTION:
+        larger = select(lambda_i > lambda_s, lambda_i, lambda_s)
+        smaller = select(lambda_i > lambda_s, lambda_s, lambda_i)
+        return 1.0 / (1.0 + larger + direction_weight(way) * smaller)
+    return 1.0 / ((1.0 + lambda_i) * (1.0 + lambda_s))
+
+
+@jit
 def smith_factor(rule, way, rough):
     """Statistical factors built on Smith's Lambda of the two directions."""
     sin_dphi = 2.0 * way.sin_h * way.cos_h
@@ -81,14 +94,8 @@ def smith_factor(rule, way, rough):
     )
     lambda_i = mean_overhang(rough, way.cos_i, way.sin_i, slope_i)
     lambda_s = mean_overhang(rough, way.cos_s, way.sin_s, slope_s)
-    if rule == SMITH_CORRELATED:
-        return 1.0 / (1.0 + lambda_i + lambda_s)
-    if rule == SMITH_DIRECTION:
-        larger = select(lambda_i > lambda_s, lambda_i, lambda_s)
-        smaller = select(lambda_i > lambda_s, lambda_s, lambda_i)
-        return 1.0 / (1.0 + larger + direction_weight(way) * smaller)
-    both = 1.0 / ((1.0 + lambda_i) * (1.0 + lambda_s))
-    if rule == SMITH_UNCORRELATED:
+    both = combined_overhangs(rule, way, lambda_i, lambda_s)
+    if rule != SMITH:
         return both
     up_i = facing_up(way.cos_i, way.sin_i, slope_i)
     return both * up_i * facing_up(way.cos_s, way.sin_s, slope_s)
