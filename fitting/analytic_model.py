@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 __all__ = ["AnalyticModel"]
 
+# Names of rules, which no fit can vary
+_RULES = ("shadowing", "slope_distribution", "volume_form", "grazing_form")
+
 
 class AnalyticModel:
     """Adapter of a `MicrofacetModel`, with exact derivatives of any order.
@@ -57,10 +60,12 @@ class AnalyticModel:
         """Return elements of the BRDF, shape (E, N), numbered along the rows. [1/sr]"""
         import casadi
 
-        names = tuple(values)
-        function = _one_geometry(
-            names, tuple(elements), self.model.shadowing, self.model.slope_distribution
-        )
+        albedo = values["volume_albedo"]
+        # The term costs more than all the rest: without it no one should pay
+        absent = isinstance(albedo, casadi.DM) and not albedo.full().any()
+        names = tuple(n for n in values if not (absent and n == "volume_albedo"))
+        rules = tuple(getattr(self.model, rule) for rule in _RULES)
+        function = _one_geometry(names, tuple(elements), rules)
         angles = np.stack(
             [geometry.theta_i, geometry.theta_s, geometry.dphi, geometry.phi_i]
         )
@@ -71,6 +76,9 @@ class AnalyticModel:
         """Return the model with these values."""
         changes: dict[str, Any] = dict(values)
         index = {name: changes.pop(name) for name in ("n", "kappa") if name in changes}
+        if "volume_albedo" in changes:
+            # One base under the interface, under one name
+            index["diffuse_albedo"] = 0.0
         if index:
             changes["material"] = replace(self.model.material, **index)
         pair = self._slopes()
@@ -89,22 +97,20 @@ class AnalyticModel:
         return {"slope_rms_x": x, "slope_rms_y": y}
 
     def _numbers(self) -> dict[str, float]:
-        """Return the model's other fields that are numbers."""
-        skip = {"material", "slope_rms", "slope_distribution", "shadowing"}
-        skip |= {"volume_form", "grazing_form"}
-        return {
+        """Return the model's other numbers."""
+        skip = {"material", "slope_rms", *_RULES}
+        numbers = {
             field.name: getattr(self.model, field.name)
             for field in fields(self.model)
             if field.name not in skip
         }
+        base = self.model.volume_albedo or self.model.material.diffuse_albedo
+        return {**numbers, "volume_albedo": base}
 
 
 @lru_cache(maxsize=64)
 def _one_geometry(
-    names: tuple[str, ...],
-    elements: tuple[int, ...],
-    shadowing: str,
-    slope_distribution: str,
+    names: tuple[str, ...], elements: tuple[int, ...], rules: tuple[str, ...]
 ) -> "casadi.Function":
     """Return (parameters, angles) -> elements, built once."""
     import casadi
@@ -117,9 +123,8 @@ def _one_geometry(
         angles[0],
         angles[1],
         angles[2],
-        shadowing=shadowing,
-        slope_distribution=slope_distribution,
         phi_i=angles[3],
+        **dict(zip(_RULES, rules, strict=True)),
     )
     rows = casadi.vec(matrix.T)
     return casadi.Function("mueller", [p, angles], [rows[list(elements)]])

@@ -148,7 +148,9 @@ def predict(
     values: dict[str, Any] = {}
     for name, value in here.items():
         if name in layout.column:
-            values[name] = x[layout.column[name][rays.parent].tolist()].T
+            entries = x[layout.column[name][rays.parent].tolist()]
+            # A slice of a single number comes out as a row, of a column as a column
+            values[name] = casadi.reshape(entries, 1, len(rays.parent))
         else:
             row = np.broadcast_to(np.asarray(value, dtype=float), rays.parent.shape)
             values[name] = casadi.DM(row.copy()).T
@@ -157,14 +159,15 @@ def predict(
     mueller = casadi.vec(model.mueller(brdf, rays.geometry, mixing.elements))
 
     first = np.searchsorted(rays.parent, np.arange(observations.geometry.size))
-    scale = casadi.MX(values["scale"])[first.tolist()].T
-    background = casadi.MX(values["background"])[first.tolist()].T
+    scale = casadi.MX(values["scale"])[:, first.tolist()].T
+    background = casadi.MX(values["background"])[:, first.tolist()].T
 
     def linear(names: np.ndarray, at: np.ndarray) -> Any:
         weights = mixing.matrix(names, at)
         offset = np.array([LINEAR[name].get("M00", 0.0) for name in names])
         where = at.tolist()
-        return scale[where] * (weights @ mueller) + background[where] * casadi.DM(offset)
+        y = scale[where, :] * (weights @ mueller)
+        return y + background[where, :] * casadi.DM(offset)
 
     y = _readings(observations, linear)
     function = casadi.Function("reading", [x], [y])
@@ -190,4 +193,4 @@ def _readings(observations: Observations, linear: Any) -> Any:
     if len(parts) == 1:
         return parts[0]
     order = np.argsort(np.concatenate([plain, ratio]))
-    return casadi.vertcat(*parts)[order.tolist()]
+    return casadi.vertcat(*parts)[order.tolist(), :]

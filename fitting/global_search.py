@@ -13,9 +13,12 @@ __all__ = ["SEARCHES", "boxed", "starts"]
 
 SEARCHES = ("multistart", "crs", "mlsl")
 
+# Points looked at, of which the best are followed
+_SCREENED = 256
+
 
 def starts(
-    objective: Objective, search: str | None, *, seed: int = 0, count: int = 16
+    objective: Objective, search: str | None, *, seed: int = 0, count: int = 5
 ) -> list[np.ndarray]:
     """Return the points from which a local solver should run.
 
@@ -24,9 +27,9 @@ def starts(
     objective : Objective
         Problem; its own start comes first.
     search : {None, "multistart", "crs", "mlsl"}
-        None for the own start alone; "multistart" adds a Halton sequence over the box; the
-        others add the best point of nlopt's controlled random search or multi-level single
-        linkage. Open bounds are closed at ten times the natural size.
+        None for the own start alone; "multistart" adds the best points of a Halton sequence
+        over the box; the others add the best point of nlopt's controlled random search or
+        multi-level single linkage. Open bounds are closed at ten times the natural size.
     seed : int
         Makes the search reproducible.
     count : int
@@ -42,10 +45,12 @@ def starts(
     if search != "multistart":
         found = search_nlopt(objective.with_parameters(box), search, seed=seed)
         return [own, found]
-    points = qmc.Halton(len(own), rng=np.random.default_rng(seed)).random(count)
+    points = qmc.Halton(len(own), rng=np.random.default_rng(seed)).random(_SCREENED)
     low = np.array([parameter.low for parameter in box])
     high = np.array([parameter.high for parameter in box])
-    return [own, *(low + points * (high - low))]
+    inside = low + points * (high - low)
+    order = np.argsort([objective.cost(point) for point in inside])
+    return [own, *inside[order[:count]]]
 
 
 def boxed(parameter: Parameter) -> Parameter:

@@ -8,7 +8,7 @@ import numpy as np
 from fitting.objective import Objective
 from fitting.solution import Solution, better, early_end
 
-__all__ = ["search_nlopt", "solve_nlopt"]
+__all__ = ["refine_nlopt", "search_nlopt", "solve_nlopt"]
 
 _REASONS = {
     1: "converged",
@@ -203,6 +203,13 @@ def _simplex(
     stage.run(optimizer)
     counts[0] += stage.count
     return stage.best_x
+
+
+def refine_nlopt(objective: Objective, *, max_evaluations: int = 2000) -> Solution:
+    """Return the minimum next to a start that is nearly one: SLSQP alone."""
+    counts = [0]
+    ended = early_end(objective, "nlopt")
+    return ended or _polish(objective, objective.start, max_evaluations, counts)
 
 
 def search_nlopt(

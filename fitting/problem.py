@@ -13,7 +13,7 @@ from fitting.aperture import Aperture
 from fitting.casadi_solver import solve_casadi
 from fitting.forward import Layout, MuellerModel, predict
 from fitting.global_search import starts
-from fitting.nlopt_solver import solve_nlopt
+from fitting.nlopt_solver import refine_nlopt, solve_nlopt
 from fitting.noise import Weights
 from fitting.objective import Objective, Prediction
 from fitting.observations import Observations
@@ -25,6 +25,12 @@ __all__ = ["SOLVERS", "Problem", "Solved", "covariance_rows"]
 SOLVERS: dict[str, Callable[[Objective], Solution]] = {
     "casadi": solve_casadi,
     "nlopt": solve_nlopt,
+}
+
+# From a point that is nearly the minimum
+_REFINERS: dict[str, Callable[[Objective], Solution]] = {
+    "casadi": solve_casadi,
+    "nlopt": refine_nlopt,
 }
 
 # Rounds of estimating the noise and fitting again
@@ -134,31 +140,34 @@ class Problem:
         changes = weights.iterates or weights.n_estimated > 0
         m00 = self.m00().function if weights.iterates else None
         stderr = objective.stderr
-        search, count = self.search, 0
-        for _ in range(_ROUNDS if changes else 1):
-            solution = self._minimise(objective, search)
+        count = 0
+        for attempt in range(_ROUNDS if changes else 1):
+            if attempt == 0:
+                solution = self._minimise(objective)
+            else:
+                solution = _REFINERS[self.solver](objective)
             count += solution.n_evaluations
             if not changes or not solution.converged:
                 break
             previous, stderr = stderr, self._stderr(objective, solution, m00)
             objective = objective.with_data(objective.data, stderr)
             objective = objective.started_at(solution.x)
-            search = None
-            if np.allclose(stderr, previous, rtol=1e-7, atol=0.0):
+            exact = stderr.max() <= 2.0 * _floor(objective)
+            if exact or np.allclose(stderr, previous, rtol=1e-6, atol=0.0):
                 break
         solution = replace(solution, n_evaluations=count, cost=objective.cost(solution.x))
         return Solved(solution, objective, _log_likelihood(objective, solution.x))
 
     def minimise(self, *, begin: np.ndarray) -> Solution:
         """Fit once from `begin`, with the standard errors of the readings as they are."""
-        return self._minimise(self.objective.started_at(begin), None)
+        return _REFINERS[self.solver](self.objective.started_at(begin))
 
-    def _minimise(self, objective: Objective, search: str | None) -> Solution:
+    def _minimise(self, objective: Objective) -> Solution:
         """Run the solver from each start and keep the lowest end."""
         solve = SOLVERS[self.solver]
         ends = [
             solve(objective.started_at(start))
-            for start in starts(objective, search, seed=self.seed)
+            for start in starts(objective, self.search, seed=self.seed)
         ]
         best = ends[0]
         for end in ends[1:]:
@@ -179,7 +188,7 @@ class Problem:
             return shape
         residual = objective.predict(solution.x) - objective.data
         leverage = _leverage(objective, solution.x)
-        floor = 1e-12 * max(float(np.abs(objective.data).max()), 1e-300)
+        floor = _floor(objective)
         stderr = shape.copy()
         for number in sorted(set(self.weights.group[self.weights.group >= 0].tolist())):
             members = self.weights.group == number
@@ -188,6 +197,11 @@ class Problem:
             factor = _spread(scaled, freedom, robust=objective.loss != "linear")
             stderr[members] = np.maximum(factor * shape[members], floor)
         return stderr
+
+
+def _floor(objective: Objective) -> float:
+    """Return the least standard error: that of readings which the model meets exactly."""
+    return 1e-9 * max(float(np.abs(objective.data).max()), 1e-300)
 
 
 def _leverage(objective: Objective, x: np.ndarray) -> np.ndarray:

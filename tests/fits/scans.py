@@ -22,13 +22,14 @@ def scan(
     step=2.5,
     dphi_offset=0.0,
     wavelength=None,
+    phi_i=0.0,
 ):
     """Scan `model` in plane, -75 to 75 degrees, with noise relative to M00."""
     view = np.deg2rad(np.arange(-75.0, 75.1, step))
     rng = np.random.default_rng(seed)
     incidence = np.full(view.size, np.deg2rad(theta_i))
     dphi = np.where(view > 0.0, np.pi, 0.0) + dphi_offset
-    brdf = model.brdf(incidence, np.abs(view), dphi, wavelength)
+    brdf = model.brdf(incidence, np.abs(view), dphi, wavelength, phi_i=phi_i)
     spread = noise * brdf[:, 0, 0]
     data = {}
     for name in elements:
@@ -41,6 +42,8 @@ def scan(
         "theta_s": ("geometry", np.abs(view)),
         "dphi": ("geometry", dphi),
     }
+    if phi_i:
+        coords["phi_i"] = ("geometry", np.full(view.size, phi_i))
     if wavelength is not None:
         coords["wavelength"] = ("geometry", np.full(view.size, wavelength))
     return xr.Dataset(data, coords=coords)
