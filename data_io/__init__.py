@@ -12,7 +12,7 @@ from data_io.micrograph import (
 )
 from data_io.mitsuba import export_mitsuba
 from data_io.model import read_model, write_model
-from data_io.profile import Profile, read_profile
+from data_io.profile import Profile, read_profile, write_profile
 from data_io.results import read_result, write_result
 
 __all__ = [
@@ -32,6 +32,7 @@ __all__ = [
     "view_angle",
     "write_goniometer",
     "write_model",
+    "write_profile",
     "write_profile_overlay",
     "write_result",
 ]

@@ -229,13 +229,13 @@ def unit_factor(name: str) -> float:
     return LENGTH_UNITS[key]
 
 
-def warn_missing_unit(path: str | Path) -> None:
+def warn_missing_unit(path: str | Path, *, stacklevel: int) -> None:
     """Say that a file without unit is taken as micrometres."""
     msg = (
         f"{Path(path).name}: no length unit is named, micrometres are assumed. "
         "Name units in the header (x_um,z_um), or give unit=."
     )
-    warnings.warn(msg, MissingUnitWarning, stacklevel=5)
+    warnings.warn(msg, MissingUnitWarning, stacklevel=stacklevel)
 
 
 def header_units(text: str) -> list[str]:

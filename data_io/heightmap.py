@@ -195,7 +195,7 @@ def _read_list(
         raise DataFileError(path, problem, "Keep three.", line=data.numbers[0])
     units = header_units(header[-1].text) if header else []
     if not units and unit is None:
-        warn_missing_unit(path)
+        warn_missing_unit(path, stacklevel=6)
     if len(units) not in (0, 1, 3):
         problem = f"expected a unit for each of x, y, z, got {units}"
         cure = "Write x_um,y_um,z_um or another unit of each."

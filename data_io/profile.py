@@ -20,6 +20,7 @@ from data_io._text import (
     unit_factor,
     warn_missing_unit,
 )
+from data_io._write import complete_file
 from data_io.instruments import INSTRUMENT_SUFFIXES, read_instrument_profile
 from data_io.x3p import read_x3p
 from pbrdf.errors import DataFileError, require
@@ -163,6 +164,22 @@ def read_profile(path: str | Path, *, unit: str | tuple[str, str] | None = None)
     )
 
 
+def write_profile(profile: Profile, path: str | Path) -> None:
+    """Write a profile as the project's CSV, columns ``x_um,z_um``, with every digit.
+
+    Parameters
+    ----------
+    profile : Profile
+        Positions and heights. [um]
+    path : str or Path
+        The file; it appears complete or not at all.
+    """
+    rows = zip(profile.x.tolist(), profile.z.tolist(), strict=True)
+    with complete_file(path) as temporary, temporary.open("w", encoding="utf-8") as stream:
+        stream.write("x_um,z_um\n")
+        stream.writelines(f"{x!r},{z!r}\n" for x, z in rows)
+
+
 def _read_x3p_profile(path: str | Path) -> Profile:
     """Read an x3p file of one line."""
     content = read_x3p(path)
@@ -254,7 +271,7 @@ def _factors(
     line, found = _named_units(header, names, column_x, column_z)
     if found is None:
         if given is None:
-            warn_missing_unit(path)
+            warn_missing_unit(path, stacklevel=4)
             return 1.0, 1.0
         return given
     factors = unit_factor(found[0]), unit_factor(found[1])

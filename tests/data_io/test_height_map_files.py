@@ -116,8 +116,9 @@ def test_text_layouts_give_the_same_map(tmp_path, text, options):
 
 def test_a_list_without_unit_is_micrometres_and_says_so(tmp_path):
     path = write(tmp_path, list_text().partition("\n")[2], "map.xyz")
-    with pytest.warns(MissingUnitWarning, match=r"map\.xyz.*micrometres"):
+    with pytest.warns(MissingUnitWarning, match=r"map\.xyz.*micrometres") as caught:
         assert_allclose(read_height_map(path).heights, ROWS.T)
+    assert caught[0].filename == __file__
 
 
 @given(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
-from data_io import MissingUnitWarning, Profile, read_profile
+from data_io import MissingUnitWarning, Profile, read_profile, write_profile
 from pbrdf.errors import DataFileError
 
 FINITE = st.floats(-1e6, 1e6, allow_subnormal=False)
@@ -62,8 +62,8 @@ def test_layouts_and_units_give_the_same_profile(tmp_path, text, unit):
 def test_round_trip_is_exact(tmp_path_factory, steps, data):
     x = np.cumsum(steps)
     z = data.draw(arrays(float, x.size, elements=FINITE))
-    rows = "".join(f"{a!r},{b!r}\n" for a, b in zip(x.tolist(), z.tolist(), strict=True))
-    path = write(tmp_path_factory.mktemp("profile"), "x_um,z_um\n" + rows)
+    path = tmp_path_factory.mktemp("profile") / "p.csv"
+    write_profile(Profile(x, z), path)
     profile = read_profile(path)
     assert_array_equal(profile.x, x)
     assert_array_equal(profile.z, z)
@@ -71,8 +71,9 @@ def test_round_trip_is_exact(tmp_path_factory, steps, data):
 
 def test_a_file_without_unit_is_micrometres_and_says_so(tmp_path):
     path = write(tmp_path, "0 1\n1 2\n2 0\n")
-    with pytest.warns(MissingUnitWarning, match=r"edge\.csv.*micrometres.*unit="):
+    with pytest.warns(MissingUnitWarning, match=r"edge\.csv.*micrometres.*unit=") as caught:
         assert read_profile(path).length == 2
+    assert caught[0].filename == __file__
 
 
 @pytest.mark.parametrize(
