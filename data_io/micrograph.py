@@ -25,6 +25,8 @@ MIN_EXPLAINED = 0.6
 MIN_QUALITY = 0.4
 # An edge with more of those, or with more overhanging columns, is no graph z(x)
 MAX_UNCLEAR, MAX_OVERHANG = 0.3, 0.2
+# So many times less like a step than the usual worst, a column shows something else
+OUTLYING = 12.0
 # Beyond this angle the columns cut the surface too obliquely. [rad]
 MAX_TILT = np.deg2rad(25)
 
@@ -432,7 +434,7 @@ def _profile(
     details: dict[str, Any],
 ) -> EdgeProfile:
     """Remove gaps, blur, grain and tilt from a trace and give it its scale."""
-    good = trace.quality >= MIN_QUALITY
+    good = _clear(trace.quality)
     column = trace.columns.astype(float)
     height = np.interp(column, column[good], trace.height[good])
     slope, level = np.polyfit(column, height, 1)
@@ -463,6 +465,20 @@ def _profile(
         warnings=_remarks(trace, restored, restoring, good),
         **details,
     )
+
+
+def _clear(quality: np.ndarray) -> np.ndarray:
+    """Return False for columns unlike a step, and for those unlike their neighbours.
+
+    Dust on the edge itself leaves a step, only a worse one than everywhere else, and moves
+    it by pixels: one speck can hold more slope than the whole edge.
+    """
+    from scipy.ndimage import binary_erosion
+
+    usual = 1 - float(np.quantile(quality, 0.1))
+    clear = quality >= max(MIN_QUALITY, 1 - OUTLYING * max(usual, 0.005))
+    # The rim of a speck is worse than it looks
+    return binary_erosion(clear, iterations=3, border_value=1)
 
 
 def _long_gaps(good: np.ndarray, longest: int) -> np.ndarray:
