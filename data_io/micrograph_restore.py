@@ -9,6 +9,7 @@ from scipy import fft, ndimage
 MIN_TRANSFER = 0.2
 # ... or where the spectrum no longer exceeds the noise by this many standard errors
 MIN_SIGNIFICANCE = 4.0
+MIN_SIGNAL_TO_NOISE = 0.3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,9 +67,8 @@ def restore(height: np.ndarray, grain: np.ndarray, step_width: float) -> Restore
         fft.dct(grain - grain.mean(axis=1, keepdims=True), norm="ortho", axis=1) ** 2
     )
     # Grain has a broad spectrum: a wide window makes its estimate sure
-    noise = ndimage.uniform_filter1d(
-        grain_power.mean(axis=0), max(n // 8, 16), mode="reflect"
-    )
+    noise = ndimage.uniform_filter1d(grain_power.mean(axis=0), max(n // 12, 16))
+    noise = noise * _excess(power, noise, wavenumber, step_width)
     noise = np.minimum(noise, power)
     noise_rms = float(np.sqrt(noise.mean()))
     blur = step_width
@@ -104,11 +104,26 @@ def _gain(
     transfer = np.exp(-((wavenumber * blur) ** 2) / 2)
     # A squared cosine amplitude has twice its mean as variance
     scatter = np.sqrt(2 / (1 + 2 * _half_window(power.size)))
-    clear = (transfer > MIN_TRANSFER) & (power > (1 + MIN_SIGNIFICANCE * scatter) * noise)
+    least = 1 + MIN_SIGNAL_TO_NOISE + MIN_SIGNIFICANCE * scatter
+    clear = (transfer > MIN_TRANSFER) & (power > least * noise)
     last = int(np.flatnonzero(clear)[-1]) if clear.any() else 0
     usable = np.arange(power.size) <= last
     share = np.clip(1 - noise / np.maximum(power, 1e-300), 0, 1)
     return np.where(usable, np.sqrt(share) / np.maximum(transfer, MIN_TRANSFER), 0.0)
+
+
+def _excess(
+    power: np.ndarray, noise: np.ndarray, wavenumber: np.ndarray, blur: float
+) -> float:
+    """Return by what factor the edge is noisier than the phases beside it.
+
+    Clipped levels have no grain while the edge between them has; there, beyond the reach of
+    the optics, the spectrum of the edge is noise alone.
+    """
+    beyond = wavenumber * blur > 2.2  # less than 1 % of a signal's power
+    if np.count_nonzero(beyond) < 16:
+        return 1.0
+    return float(np.clip(power[beyond].mean() / max(noise[beyond].mean(), 1e-300), 1.0, 1e6))
 
 
 def _smooth_spectrum(power: np.ndarray) -> np.ndarray:

@@ -115,7 +115,8 @@ def _straightest_line(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     rng = np.random.default_rng(0)
     pairs = rng.integers(0, len(xy), (600, 2))
     span = np.ptp(xy[:, 0])
-    best, best_count = None, 0
+    best: tuple[np.ndarray, np.ndarray] | None = None
+    best_count = 0
     sample = xy[:: max(1, len(xy) // 3000)]
     for i, j in pairs:
         step = xy[j] - xy[i]
@@ -123,7 +124,7 @@ def _straightest_line(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
             continue
         direction = step * np.sign(step[0]) / np.hypot(*step)
         distance = np.abs((sample - xy[i]) @ np.array([-direction[1], direction[0]]))
-        count = np.count_nonzero(distance < 1.5)
+        count = int(np.count_nonzero(distance < 1.5))
         if count > best_count:
             best, best_count = (xy[i], direction), count
     if best is None:

@@ -1,6 +1,7 @@
 """Print how well edges are read from synthetic micrographs; see README.md."""
 
 import argparse
+import itertools
 import tempfile
 import warnings
 from pathlib import Path
@@ -11,6 +12,7 @@ from skimage.io import imsave
 
 from data_io.micrograph import read_profile_image
 from examples.micrograph import Camera, Edge, gaussian_edge, photograph
+from fitting import surface_statistics
 
 SLOPE_RMS = 0.252
 
@@ -39,10 +41,12 @@ def one_picture(
     raw = read_profile_image(path, camera.um_per_pixel, restoring=False)
     read = read_profile_image(path, camera.um_per_pixel)
     error = read.z - aligned(truth, read.x)
+    statistics = surface_statistics(read)
     return {
         "raw slope": slope_rms(raw.x, raw.z) / slope_rms(truth.x, truth.z),
         "slope": slope_rms(read.x, read.z) / slope_rms(truth.x, truth.z),
         "height": read.z.std() / truth.z.std(),
+        "fitted slope": statistics.slope_rms.value / slope_rms(truth.x, truth.z),
         "error": float(error.std()) / camera.um_per_pixel,
         "blur": read.blur / camera.um_per_pixel / np.hypot(camera.blur, np.sqrt(1 / 12)),
         "tilt": float(np.rad2deg(read.tilt - camera.tilt)),
@@ -66,39 +70,30 @@ def aligned(truth: Edge, x: np.ndarray) -> np.ndarray:
     return np.interp(x + truth.x[-1] / 2 - x[-1] / 2, truth.x, truth.z)
 
 
+HEAD = """
+corr blur grain light tilt |  raw   | read slope  | fitted slope | read height | edge   | blur
+ px   px    %     %   deg  | slope  | ratio  sd % | ratio  sd %  | ratio  sd % | rms px | ratio"""
+
+
 def main() -> None:
     """Print a table of conditions; every ratio is read over true."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pictures", type=int, default=5, help="pictures a condition")
-    parser.add_argument(
-        "--lengths", type=float, default=50, help="correlation lengths a picture"
-    )
-    parser.add_argument(
-        "--corr", type=float, nargs="+", default=(10, 30, 100), help="pixels"
-    )
+    parser.add_argument("--lengths", type=float, default=50, help="in corr_length")
+    parser.add_argument("--corr", type=float, nargs="+", default=(10, 30, 100), help="pixels")
     arguments = parser.parse_args()
-    print(
-        "corr  blur grain light tilt |  raw slope |   slope  scatter | height scatter "
-        "| edge rms | blur | tilt"
-    )
-    print(
-        " px    px    %     %   deg |    ratio   |   ratio     %    |  ratio    %    "
-        "|    px    | ratio| deg"
-    )
-    conditions = [
-        (corr, blur, grain, light, tilt)
-        for corr in arguments.corr
-        for blur, grain, light, tilt in (
-            (0.5, 0.02, 0.1, 0.0),
-            (0.5, 0.10, 0.4, 5.0),
-            (1.5, 0.05, 0.3, 2.0),
-            (3.0, 0.02, 0.1, 0.0),
-            (3.0, 0.10, 0.4, 5.0),
-        )
+    print(HEAD)
+    kinds = [
+        (0.5, 0.02, 0.1, 0.0),
+        (0.5, 0.10, 0.4, 5.0),
+        (1.5, 0.05, 0.3, 2.0),
+        (3.0, 0.02, 0.1, 0.0),
+        (3.0, 0.05, 0.3, 2.0),
+        (3.0, 0.10, 0.4, 5.0),
     ]
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for corr, blur, grain, light, tilt in conditions:
+        for corr, (blur, grain, light, tilt) in itertools.product(arguments.corr, kinds):
             camera = Camera(
                 blur=blur, grain=grain, uneven_light=light, tilt=np.deg2rad(tilt)
             )
@@ -107,13 +102,14 @@ def main() -> None:
                 for seed in range(arguments.pictures)
             ]
             mean = {key: np.mean([row[key] for row in rows]) for key in rows[0]}
-            spread = {key: 100 * np.std([row[key] for row in rows]) for key in rows[0]}
+            sd = {key: 100 * np.std([row[key] for row in rows]) for key in rows[0]}
             print(
-                f"{corr:4.0f} {blur:5.1f} {100 * grain:5.0f} {100 * light:5.0f} "
-                f"{tilt:5.1f} | {mean['raw slope']:10.3f} | "
-                f"{mean['slope']:7.3f} {spread['slope']:8.1f} | "
-                f"{mean['height']:6.3f} {spread['height']:7.1f} | {mean['error']:8.3f} | "
-                f"{mean['blur']:.3f}| {mean['tilt']:+.3f}"
+                f"{corr:4.0f} {blur:4.1f} {100 * grain:5.0f} {100 * light:5.0f} {tilt:5.1f}  |"
+                f" {mean['raw slope']:6.3f} | {mean['slope']:.3f} {sd['slope']:5.1f} | "
+                f"{mean['fitted slope']:.3f} {sd['fitted slope']:5.1f}  | "
+                f"{mean['height']:.3f} {sd['height']:5.1f} | {mean['error']:6.3f} | "
+                f"{mean['blur']:.3f}",
+                flush=True,
             )
 
 
