@@ -1,5 +1,6 @@
 """The closed-form model: slope distributions, shadowing, the microfacet BRDF."""
 
+from pbrdf.analytic.bounces import second_bounce
 from pbrdf.analytic.hemisphere import HemisphericalReflectance, emissivity, reflectance
 from pbrdf.analytic.microfacet import MicrofacetModel
 from pbrdf.analytic.named import (
@@ -29,5 +30,6 @@ __all__ = [
     "generalised",
     "priest_germer",
     "reflectance",
+    "second_bounce",
     "torrance_sparrow",
 ]

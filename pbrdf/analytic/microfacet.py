@@ -213,16 +213,20 @@ class MicrofacetModel:
         )  # fmt: skip
         return out
 
-    def _surface(self) -> kernel.Surface:
-        """Numbers of the model as the kernels take them."""
+    def roughness(self) -> Roughness:
+        """Slope law as the kernels take it; of a table, the Gaussian of its rms."""
         name = self.slope_distribution
         law = GAUSSIAN if isinstance(name, SlopeTable) else SLOPE_DISTRIBUTIONS[name].code
         slope_x, slope_y = np.broadcast_to(np.asarray(self.slope_rms), 2).tolist()
+        norm = slope_norm(law, slope_x, slope_y)
+        return Roughness(law, slope_x, slope_y, slope_x == slope_y, norm)
+
+    def _surface(self) -> kernel.Surface:
+        """Numbers of the model as the kernels take them."""
+        rule = SHADOWING[self.shadowing].code
         return kernel.Surface(
-            Roughness(
-                law, slope_x, slope_y, slope_x == slope_y, slope_norm(law, slope_x, slope_y)
-            ),
-            Shadowing(SHADOWING[self.shadowing].code, self.shadow_omega, self.shadow_tau),
+            self.roughness(),
+            Shadowing(rule, self.shadow_omega, self.shadow_tau),
             float(self.specular_gain),
             self._diffuse(),
         )
