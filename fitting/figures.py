@@ -17,7 +17,11 @@ __all__ = ["hemisphere_figure", "histogram_figure", "new_figure", "scan_figure"]
 # Colours that stay apart in print and for colour-blind eyes (Okabe and Ito)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 QUANTITIES = {"M00": "M00 [1/sr]", "M10": "M10 [1/sr]", "DOLP": "DOLP [1]"}
-MODELS = {"monte_carlo": ("Monte Carlo", "-"), "analytic": ("analytical", "--")}
+# Label, line style, and colour where one incidence leaves colours for the models
+MODELS = {
+    "monte_carlo": ("Monte Carlo", "-", COLOURS[0]),
+    "analytic": ("analytical", "--", COLOURS[1]),
+}
 
 
 def new_figure(rows: int, columns: int, size: tuple[float, float]) -> "tuple[Figure, Any]":
@@ -71,7 +75,7 @@ def scan_figure(measured: xr.Dataset, curves: xr.Dataset | None = None) -> "Figu
         upper = axes[0, column]
         for position, theta_i in enumerate(incidences):
             scan = measured.isel(geometry=np.abs(measured.theta_i.values - theta_i) < 1e-8)
-            colour = COLOURS[position % len(COLOURS)]
+            colour = COLOURS[position % len(COLOURS)] if incidences.size > 1 else None
             if curves is not None:
                 curve = curves.sel(theta_i=theta_i, method="nearest")
                 _draw_curves(upper, name, curve, colour)
@@ -128,8 +132,7 @@ def hemisphere_figure(simulation: xr.Dataset, theta_i: float) -> "Figure":
         image = axis.pcolormesh(
             azimuth, zenith, values, cmap=colours, vmin=limits[0], vmax=limits[1]
         )
-        axis.set(title=title, xticklabels=[], yticks=(30, 60))
-        axis.set_rlabel_position(90)
+        axis.set(title=title, xticklabels=[], yticks=(30, 60), rlabel_position=90)
         axis.grid(alpha=0.3)
         figure.colorbar(image, ax=axis, shrink=0.75)
     angle = np.rad2deg(float(here.theta_i))
@@ -170,7 +173,7 @@ def _spans_decades(values: np.ndarray) -> bool:
     return bool(values.size) and float(values.max() / np.median(values)) > 30.0
 
 
-def _models_of(curve: xr.Dataset) -> dict[str, tuple[str, str]]:
+def _models_of(curve: xr.Dataset) -> dict[str, tuple[str, str, str]]:
     return {model: look for model, look in MODELS.items() if f"{model}_M00" in curve}
 
 
@@ -178,44 +181,50 @@ def _incidence(dataset: xr.Dataset) -> str:
     return f"{np.rad2deg(float(np.mean(dataset.theta_i))):.4g}°"
 
 
-def _draw_curves(axis: "Axes", name: str, curve: xr.Dataset, colour: str) -> None:
+def _draw_curves(axis: "Axes", name: str, curve: xr.Dataset, colour: str | None) -> None:
     """Draw both models of one incidence, with the 95 % band of the simulation."""
     view = np.rad2deg(curve.theta_view.values)
-    for model, (label, style) in _models_of(curve).items():
+    for model, (label, style, own) in _models_of(curve).items():
         value = curve[f"{model}_{name}"]
         axis.plot(
-            view, value, style, color=colour, linewidth=1.3,
+            view, value, style, color=colour or own, linewidth=1.3,
             label=f"{label} {_incidence(curve)}",
         )  # fmt: skip
         if f"{model}_{name}_stderr" in curve:
             error = 1.96 * curve[f"{model}_{name}_stderr"]
             axis.fill_between(
-                view, value - error, value + error, color=colour, alpha=0.2, linewidth=0
+                view,
+                value - error,
+                value + error,
+                color=colour or own,
+                alpha=0.2,
+                linewidth=0,
             )
 
 
-def _draw_points(axis: "Axes", name: str, scan: xr.Dataset, colour: str) -> None:
+def _draw_points(axis: "Axes", name: str, scan: xr.Dataset, colour: str | None) -> None:
     if name not in scan:
         return
     error = scan[f"{name}_stderr"].values if f"{name}_stderr" in scan else None
     axis.errorbar(
         np.rad2deg(scan.theta_view.values), scan[name].values, error,
-        fmt="o", markersize=2.6, elinewidth=0.7, color=colour, mfc="white", mew=0.8,
-        label=f"measured {_incidence(scan)}", zorder=3,
+        fmt="o", markersize=2.6, elinewidth=0.7, color=colour or "0.3", mfc="white",
+        mew=0.8, label=f"measured {_incidence(scan)}", zorder=3,
     )  # fmt: skip
 
 
 def _draw_residuals(
-    axis: "Axes", name: str, scan: xr.Dataset, curve: xr.Dataset, colour: str
+    axis: "Axes", name: str, scan: xr.Dataset, curve: xr.Dataset, colour: str | None
 ) -> None:
     """Draw what the points of one incidence show beyond each model."""
     axis.axhline(0.0, color="0.4", linewidth=0.8)
     if name not in scan:
         return
     at = scan.theta_view.values
-    for model, (_, style) in _models_of(curve).items():
+    for model, (_, style, own) in _models_of(curve).items():
         there = np.interp(at, curve.theta_view.values, curve[f"{model}_{name}"].values)
         axis.plot(
-            np.rad2deg(at), scan[name].values - there, style, color=colour, linewidth=1.0,
+            np.rad2deg(at), scan[name].values - there, style, color=colour or own,
+            linewidth=1.0,
             marker="." if style == "-" else None, markersize=3,
         )  # fmt: skip
