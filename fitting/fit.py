@@ -108,7 +108,8 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     """
     # Solvers and models load when something is fitted, not when `fitting` is imported
     from fitting.assembly import Question, assemble
-    from fitting.report_fit import best_result
+    from fitting.problem import solve_likeliest
+    from fitting.report_fit import result_of
 
     question = Question(
         free=tuple(free),
@@ -125,4 +126,4 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     problems, uncertain = assemble(
         measurement, model, question, use=use, mask=mask, noise=noise
     )
-    return best_result([(problem, problem.solve()) for problem in problems], uncertain)
+    return result_of(*solve_likeliest(problems), uncertain)

@@ -4,7 +4,7 @@ Profiles, comparisons and the study of what the data cannot tell all solve varia
 problem; this is the problem they share.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from fitting.observations import Observations
 from fitting.parameters import Parameter
 from fitting.solution import Solution, better
 
-__all__ = ["SOLVERS", "Problem", "Solved", "covariance_rows"]
+__all__ = ["SOLVERS", "Problem", "Solved", "covariance_rows", "solve_likeliest"]
 
 SOLVERS: dict[str, Callable[[Objective], Solution]] = {
     "casadi": solve_casadi,
@@ -125,24 +125,26 @@ class Problem:
         objective = self.objective.with_parameters(held)
         return replace(self, parameters=held, objective=objective, search=None)
 
-    def solve(self, *, begin: np.ndarray | None = None) -> Solved:
+    def solve(self, *, rounds: int = _ROUNDS, after: "Solved | None" = None) -> Solved:
         """Fit, and where the noise is part of the question, fit and estimate it in turn.
 
         Parameters
         ----------
-        begin : ndarray, shape (n,), optional
-            A start in place of the parameters' own.
+        rounds : int
+            Limit of the turns.
+        after : Solved, optional
+            Earlier turns of this problem, to go on from.
         """
         objective = self.objective
-        if begin is not None:
-            objective = objective.started_at(begin)
+        if after is not None:
+            objective = after.objective.started_at(after.solution.x)
         weights = self.weights
         changes = weights.iterates or weights.n_estimated > 0
         m00 = self.m00().function if weights.iterates else None
         stderr = objective.stderr
-        count = 0
-        for attempt in range(_ROUNDS if changes else 1):
-            if attempt == 0:
+        count = 0 if after is None else after.solution.n_evaluations
+        for attempt in range(rounds if changes else 1):
+            if attempt == 0 and after is None:
                 solution = self._minimise(objective)
             else:
                 solution = _REFINERS[self.solver](objective)
@@ -153,7 +155,7 @@ class Problem:
             objective = objective.with_data(objective.data, stderr)
             objective = objective.started_at(solution.x)
             exact = stderr.max() <= 2.0 * _floor(objective)
-            if exact or np.allclose(stderr, previous, rtol=1e-6, atol=0.0):
+            if exact or np.allclose(stderr, previous, rtol=1e-5, atol=0.0):
                 break
         solution = replace(solution, n_evaluations=count, cost=objective.cost(solution.x))
         return Solved(solution, objective, _log_likelihood(objective, solution.x))
@@ -197,6 +199,25 @@ class Problem:
             factor = _spread(scaled, freedom, robust=objective.loss != "linear")
             stderr[members] = np.maximum(factor * shape[members], floor)
         return stderr
+
+
+def solve_likeliest(problems: Sequence[Problem]) -> tuple[Problem, Solved]:
+    """Solve problems that differ in the shape of their noise; return the likeliest.
+
+    A few turns show which shape it is; only that one is followed to the end. A problem
+    without a minimum comes last.
+    """
+    if len(problems) == 1:
+        return problems[0], problems[0].solve()
+
+    def rank(pair: tuple[Problem, Solved]) -> tuple[bool, float]:
+        likelihood = pair[1].log_likelihood
+        finite = likelihood if np.isfinite(likelihood) else -np.inf
+        return pair[1].solution.converged, finite
+
+    tried = [(problem, problem.solve(rounds=3)) for problem in problems]
+    problem, solved = max(tried, key=rank)
+    return problem, problem.solve(after=solved)
 
 
 def _floor(objective: Objective) -> float:

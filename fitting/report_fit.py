@@ -1,6 +1,6 @@
 """Turn a solved problem into a result with uncertainties and warnings."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -18,23 +18,7 @@ from fitting.uncertainty import (
     sandwich,
 )
 
-__all__ = ["best_result", "result_of"]
-
-
-def best_result(
-    solved: Sequence[tuple[Problem, Solved]], uncertain: Mapping[str, float]
-) -> FitResult:
-    """Return the result of the best of several problems that differ in their noise.
-
-    Converged ones come first, then the likelihood decides.
-    """
-
-    def rank(pair: tuple[Problem, Solved]) -> tuple[bool, float]:
-        likelihood = pair[1].log_likelihood
-        finite = likelihood if np.isfinite(likelihood) else -np.inf
-        return pair[1].solution.converged, finite
-
-    return result_of(*max(solved, key=rank), uncertain)
+__all__ = ["result_of"]
 
 
 def result_of(
