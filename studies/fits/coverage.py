@@ -3,8 +3,8 @@
     python studies/fits/coverage.py --scans 2000
 
 Prints one line a parameter: coverage, mean and standard deviation of the pulls
-Prints one line a parameter: coverage, mean and standard deviation of the pulls,
-(estimate - truth) / stderr, and the standard error over the Cramér-Rao bound at the truth.
+(estimate - truth) / stderr, and the stderr over the Cramér-Rao bound at the truth.
+"""
 
 import argparse
 import time
