@@ -1,4 +1,4 @@
-"""Directions, frames and the one table of result variables (the conventions page in code)."""
+"""The conventions page in code: directions, frames, the one table of result variables."""
 
 from typing import NamedTuple
 
@@ -47,6 +47,10 @@ RESULT_VARIABLES: dict[str, Variable] = {
         "1", "share of the light still travelling at the bounce limit", ("theta_i", "wavelength")
     ),
     "leaked": Variable("1", "share of the light lost by a fault", ("theta_i", "wavelength")),
+    "left_sideways": Variable(
+        "1", "share of the light that a diffuse base sent off a finite map",
+        ("theta_i", "wavelength"),
+    ),
     "side_exits": Variable(
         "1", "share of the rays that left a finite map sideways, not counted", ("theta_i",)
     ),
@@ -61,7 +65,7 @@ RESULT_VARIABLES: dict[str, Variable] = {
 
 
 def direction(theta: npt.ArrayLike, phi: npt.ArrayLike) -> np.ndarray:
-    """Unit vector that leaves the surface at zenith theta and azimuth phi, shape (..., 3).
+    """Return the unit vector that leaves the surface at (theta, phi), shape (..., 3).
 
     Examples
     --------
@@ -70,7 +74,9 @@ def direction(theta: npt.ArrayLike, phi: npt.ArrayLike) -> np.ndarray:
     """
     theta, phi = np.broadcast_arrays(theta, phi)
     sin_theta = np.sin(theta)
-    return np.stack([sin_theta * np.cos(phi), sin_theta * np.sin(phi), np.cos(theta)], axis=-1)
+    return np.stack(
+        [sin_theta * np.cos(phi), sin_theta * np.sin(phi), np.cos(theta)], axis=-1
+    )
 
 
 def meridian_frame(
@@ -88,7 +94,9 @@ def meridian_frame(
     (array([0., 1., 0.]), array([0., 0., 1.]))
     """
     k = np.asarray(prop, dtype=np.float64)
-    azimuth = np.where(np.hypot(k[..., 0], k[..., 1]) > 0.0, np.arctan2(k[..., 1], k[..., 0]), phi)
+    azimuth = np.where(
+        np.hypot(k[..., 0], k[..., 1]) > 0.0, np.arctan2(k[..., 1], k[..., 0]), phi
+    )
     e_s = np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)], axis=-1)
     return e_s, np.cross(k, e_s)
 

@@ -16,6 +16,7 @@ from pbrdf.kernels.shading import (
     N_SELF,
     N_SIDE,
     N_TRUNCATED,
+    SIDEWAYS,
     TRUNCATED,
 )
 from pbrdf.scene import Scene
@@ -53,6 +54,7 @@ def to_dataset(
         "transmitted": np.zeros(energy.shape[:2]),
         "truncated": energy[..., TRUNCATED],
         "leaked": energy[..., LEAKED],
+        "left_sideways": energy[..., SIDEWAYS],
         "side_exits": counts[:, N_SIDE] / rays,
     }
     coords: dict[str, Any] = {
@@ -100,5 +102,5 @@ def _scene_text(scene: Scene) -> str:
         return scene.to_toml()
     except ValueError:
         surface = scene.surface
-        assert isinstance(surface, HeightMap)  # noqa: S101
+        assert isinstance(surface, HeightMap)
         return f"# {surface!r}, height rms {np.std(surface.heights):.6g} um"

@@ -23,7 +23,9 @@ _SURFACE_KEYS = {
     "height_map": {"file", "heights_um", "spacing_um", "periodic", "labels"},
     "flat": {"size_um"},
 }
-_SUBSTRATE_KEYS = {"material", "materials", "n", "kappa", "diffuse_albedo", "wavelength_um", "name"}
+_SUBSTRATE_KEYS = {
+    "material", "materials", "n", "kappa", "diffuse_albedo", "wavelength_um", "name",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +37,8 @@ class Scene:
     surface : HeightMap or GaussianSurface
         A fixed surface, or an ensemble of which realisations are drawn.
     substrate : Material or str, or a sequence of them
-        Material under the surface, or its name in the library; several where the labels of a
-        HeightMap number them.
+        Material under the surface, or its name in the library; several where the labels of
+        a HeightMap number them.
     contaminants : tuple
         What lies on the surface; none is known to this version.
 
@@ -134,8 +136,8 @@ def _check_labels(
     highest = 0 if labels is None else int(labels.max())
     if highest >= len(materials) or (labels is None and len(materials) != 1):
         msg = (
-            f"substrate must have one material for each label, got {len(materials)} for labels "
-            f"up to {highest}. Give a list of materials and HeightMap(..., labels=)."
+            f"substrate must have one material for each label, got {len(materials)} for "
+            f"labels up to {highest}. Give a list of materials and HeightMap(..., labels=)."
         )
         raise ValueError(msg)
 
@@ -143,8 +145,9 @@ def _check_labels(
 def load_scene(path: str | Path) -> Scene:
     """Read a scene from its TOML file.
 
-    Lengths carry `_um` in their key. Heights come from a .npy file named relative to the TOML
-    file, or inline. Tables other than [surface] and [substrate] are left to their readers.
+    Lengths carry `_um` in their key. Heights come from a .npy file named relative to the
+    TOML file, or inline. Tables other than [surface] and [substrate] are left to their
+    readers.
 
     Raises
     ------
@@ -160,7 +163,8 @@ def load_scene(path: str | Path) -> Scene:
     except DataFileError:
         raise
     except (TypeError, ValueError) as error:
-        raise DataFileError(source, str(error).rstrip("."), "See the documented keys.") from error
+        problem = str(error).rstrip(".")
+        raise DataFileError(source, problem, "See the documented keys.") from error
 
 
 def read_toml(source: Path) -> dict[str, Any]:
@@ -183,11 +187,15 @@ def _required(document: Mapping[str, Any], name: str, source: Path) -> dict[str,
     return dict(table)
 
 
-def _check_keys(table: Mapping[str, Any], known: set[str], place: str, source: Path) -> None:
+def _check_keys(
+    table: Mapping[str, Any], known: set[str], place: str, source: Path
+) -> None:
     for key in table:
         if key not in known:
             raise DataFileError(
-                source, f"[{place}]: unknown key {key!r}", f"Known: {', '.join(sorted(known))}."
+                source,
+                f"[{place}]: unknown key {key!r}",
+                f"Known: {', '.join(sorted(known))}.",
             )
 
 
@@ -202,7 +210,9 @@ def _pair(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-def _surface_table(surface: HeightMap | GaussianSurface, file: Path | None) -> dict[str, Any]:
+def _surface_table(
+    surface: HeightMap | GaussianSurface, file: Path | None
+) -> dict[str, Any]:
     if isinstance(surface, GaussianSurface):
         table = {
             "type": "gaussian",
@@ -265,7 +275,9 @@ def _read_surface(table: dict[str, Any], source: Path) -> HeightMap | GaussianSu
     if kind == "gaussian":
         for key in ("shape", "spacing_um", "corr_length_um"):
             if key not in table:
-                raise DataFileError(source, f"[surface]: key {key!r} is missing", "Give it.")
+                raise DataFileError(
+                    source, f"[surface]: key {key!r} is missing", "Give it."
+                )
         return GaussianSurface(
             shape=_pair(table["shape"]),
             spacing=_pair(table["spacing_um"]),
@@ -275,7 +287,9 @@ def _read_surface(table: dict[str, Any], source: Path) -> HeightMap | GaussianSu
         )
     if ("file" in table) == ("heights_um" in table):
         raise DataFileError(
-            source, "[surface]: heights come from 'file' or 'heights_um'", "Give exactly one."
+            source,
+            "[surface]: heights come from 'file' or 'heights_um'",
+            "Give exactly one.",
         )
     if "spacing_um" not in table:
         raise DataFileError(source, "[surface]: key 'spacing_um' is missing", "Give it.")
@@ -315,7 +329,9 @@ def _read_material(table: dict[str, Any], source: Path) -> Material:
             )  # fmt: skip
         return library.get(table["material"])
     if "n" not in table:
-        raise DataFileError(source, "[substrate]: key 'n' is missing", "Or give 'material'.")
+        raise DataFileError(
+            source, "[substrate]: key 'n' is missing", "Or give 'material'."
+        )
     wavelength = table.pop("wavelength_um", None)
     if wavelength is None:
         return Material(**table)

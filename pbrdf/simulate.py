@@ -12,6 +12,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from pbrdf.errors import AccuracyWarning, require
+from pbrdf.kernels.shading import base_strength
 from pbrdf.results import to_dataset
 from pbrdf.scene import Scene
 from pbrdf.surface import GaussianSurface, HeightMap
@@ -57,7 +58,8 @@ def simulate(
     theta_i : array_like, shape () or (angles,)
         Zenith angle of the source, in [0, π/2). [rad]
     phi_i : float or "uniform"
-        Azimuth of the source [rad]; "uniform" averages over it, as suits an isotropic surface.
+        Azimuth of the source [rad]; "uniform" averages over it, as suits an isotropic
+        surface.
     n_rays : int
         Rays an incident direction and realisation.
     realizations : int
@@ -81,15 +83,15 @@ def simulate(
     progress : callable, optional
         Called with (samples done, samples in all).
     skips : bool
-        Follow rays over a height field by an exact float64 walk, without Embree; False sends
-        every ray through Embree. Both trace the same rays.
+        Follow rays over a height field by an exact float64 walk, without Embree; False
+        sends every ray through Embree. Both trace the same rays.
 
     Returns
     -------
     xarray.Dataset
         `brdf` [sr^-1] and `brdf_stderr` (bounces, theta_i, [wavelength], theta_s, dphi,
-        stokes_out, stokes_in), `brdf_total` for all bounces, `albedo`, the energy budget and
-        `projected_solid_angle`; see `pbrdf.conventions.RESULT_VARIABLES`.
+        stokes_out, stokes_in), `brdf_total` for all bounces, `albedo`, the energy budget
+        and `projected_solid_angle`; see `pbrdf.conventions.RESULT_VARIABLES`.
 
     Raises
     ------
@@ -122,13 +124,21 @@ def simulate(
     samples = max(BATCHES, drawn) if batched else drawn
     angles = _angles(theta_i)
     waves = _wavelengths(wavelength)
+    n, kappa, base = _constants(scene, waves)
+    if base.shape[1] > 0 and not skips:
+        msg = (
+            "skips must be True over a diffuse base, got False. Embree alone traces opaque "
+            "Fresnel surfaces only."
+        )
+        raise ValueError(msg)
     plan = Plan(
         theta_i=angles,
         phi_i=_azimuth(phi_i),
         n_rays=-(-rays * drawn // samples) if batched else rays,
         max_bounces=_count("max_bounces", max_bounces, 1),
-        n=_index(scene, waves)[0],
-        kappa=_index(scene, waves)[1],
+        n=n,
+        kappa=kappa,
+        base=base,
         n_stokes=_stokes_count(stokes),
         n_theta=_count("n_theta", n_theta, 1),
         n_dphi=_even("n_dphi", n_dphi),
@@ -142,10 +152,12 @@ def simulate(
     root = np.random.SeedSequence(seed)
     if batched:
         # The surface, or the one realisation asked for, stays the same in all batches
-        shared = surface if isinstance(surface, HeightMap) else surface.sample(root.spawn(1)[0])
+        shared = (
+            surface if isinstance(surface, HeightMap) else surface.sample(root.spawn(1)[0])
+        )
         draw = partial(_trace_fixed, _prepare(shared, skips), plan)
     else:
-        assert isinstance(surface, GaussianSurface)  # noqa: S101
+        assert isinstance(surface, GaussianSurface)
         draw = partial(_trace_realization, surface, plan, skips)
 
     moments = Moments(plan)
@@ -228,7 +240,9 @@ def _angles(theta_i: npt.ArrayLike) -> np.ndarray:
         )
     )
     if angles.ndim != 1 or angles.size == 0:
-        msg = f"theta_i must be a number or one-dimensional [rad], got shape {angles.shape}."
+        msg = (
+            f"theta_i must be a number or one-dimensional [rad], got shape {angles.shape}."
+        )
         raise ValueError(msg)
     return angles
 
@@ -244,7 +258,9 @@ def _wavelengths(wavelength: npt.ArrayLike | None) -> np.ndarray | None:
         "Wavelengths are micrometres.",
     )
     if waves.ndim > 1 or waves.size == 0:
-        msg = f"wavelength must be a number or one-dimensional [um], got shape {waves.shape}."
+        msg = (
+            f"wavelength must be a number or one-dimensional [um], got shape {waves.shape}."
+        )
         raise ValueError(msg)
     return waves
 
@@ -306,25 +322,36 @@ def _workers(workers: int | None) -> int:
     return _count("workers", workers, 1)
 
 
-def _index(scene: Scene, waves: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    n, kappa = scene.substrate.indices(waves)
-    n, kappa = np.broadcast_arrays(np.atleast_1d(n), np.atleast_1d(kappa))
-    if waves is not None and waves.ndim == 1:
-        n, kappa = np.broadcast_to(n, waves.shape), np.broadcast_to(kappa, waves.shape)
-    return np.ascontiguousarray(n), np.ascontiguousarray(kappa)
+def _constants(
+    scene: Scene, waves: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Index n, kappa and strength of the diffuse base, (wavelengths, materials)."""
+    count = 1 if waves is None or waves.ndim == 0 else waves.size
+    shape = (count, len(scene.materials))
+    n, kappa, base = np.empty(shape), np.empty(shape), np.empty(shape)
+    for column, material in enumerate(scene.materials):
+        n[:, column], kappa[:, column] = material.indices(waves)
+        albedo = material.diffuse_albedo
+        opaque = kappa[:, column].any() or not np.isfinite(n[:, column]).all()
+        if albedo > 0.0 and opaque:
+            msg = (
+                f"kappa must be 0 over a diffuse base [1], got {kappa[:, column].max():g} "
+                f"and diffuse_albedo {albedo:g}. Light does not reach a base under an absorber."
+            )
+            raise ValueError(msg)
+        base[:, column] = [
+            base_strength(albedo, *index)
+            for index in zip(n[:, column], kappa[:, column], strict=True)
+        ]
+    return n, kappa, base if base.any() else np.empty((count, 0))
 
 
 def _check_scene(scene: Scene) -> None:
-    if scene.substrate.diffuse_albedo > 0.0:
-        msg = (
-            f"diffuse_albedo of the substrate must be 0 in this version, got "
-            f"{scene.substrate.diffuse_albedo:g}. Add a Lambertian term to the result instead."
-        )
-        raise ValueError(msg)
     if isinstance(scene.surface, HeightMap) and scene.surface.missing > 0.0:
         msg = (
-            f"heights must be complete to be traced, got {100 * scene.surface.missing:.2g} % "
-            "missing. Fill the holes with HeightMap.filled()."
+            "heights must be complete to be traced, got "
+            f"{100 * scene.surface.missing:.2g} % missing. Fill the holes with "
+            "HeightMap.filled()."
         )
         raise ValueError(msg)
 

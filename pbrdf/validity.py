@@ -11,8 +11,8 @@ def geometric_optics_warnings(
     """Say which limits of geometric optics a Gaussian surface breaks at a wavelength [um].
 
     Checks the coherent beam that stays specular, exp(-(4π h cosθ / λ)²) above 1 % (Davies
-    1954), and the tangent plane: typical radius of curvature below 5 λ or correlation length
-    below λ (Thorsos 1988).
+    1954), and the tangent plane: typical radius of curvature below 5 λ or correlation
+    length below λ (Thorsos 1988).
     """
     height = surface.ensemble_height_rms
     length = float(np.min(surface.corr_length))
@@ -33,5 +33,7 @@ def geometric_optics_warnings(
             f"{wavelength:g} um: the tangent plane does not hold."
         )
     if length < wavelength:
-        found.append(f"corr_length {length:.3g} um is below the wavelength {wavelength:g} um.")
+        found.append(
+            f"corr_length {length:.3g} um is below the wavelength {wavelength:g} um."
+        )
     return found

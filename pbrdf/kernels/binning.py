@@ -1,7 +1,7 @@
 """Detector bins: equal in zenith angle, equal in azimuth and centred on 0 and pi.
 
-A cheap approximation of the angle names a bin, and a comparison with the exact edges of the bin
-then corrects it; no inverse trigonometric function is called.
+A cheap approximation of the angle names a bin, and a comparison with the exact edges of the
+bin then corrects it; no inverse trigonometric function is called.
 """
 
 import math
@@ -18,7 +18,8 @@ TWO_PI = 2.0 * math.pi
 @jit
 def bin_edges(n_theta, n_dphi):
     """Cosines of the zenith edges (n_theta + 1), falling, and unit vectors of the lower azimuth
-    edges (n_dphi, 2)."""
+    edges (n_dphi, 2).
+    """
     zenith = np.empty(n_theta + 1)
     for k in range(n_theta + 1):
         zenith[k] = math.cos(HALF_PI * k / n_theta)
@@ -34,7 +35,7 @@ def bin_edges(n_theta, n_dphi):
 
 @jit(inline="always")
 def rough_arccos(x):
-    """arccos of x in [0, 1] to 7e-5 (Abramowitz and Stegun, eq. 4.4.45)."""
+    """Arccos of x in [0, 1] to 7e-5 (Abramowitz and Stegun, eq. 4.4.45)."""
     series = 1.5707288 + x * (-0.2121144 + x * (0.0742610 - 0.0187293 * x))
     return math.sqrt(max(1.0 - x, 0.0)) * series
 

@@ -6,6 +6,7 @@ line: every point of the entry rectangle is equally likely, and none is far from
 """
 
 import math
+from collections import namedtuple
 
 from pbrdf.kernels import jit
 
@@ -15,6 +16,15 @@ STRIDE_OFFSET = 0.6180339887498949
 STRIDE_PHI = 0.7548776662466927
 
 
+# Rays of one incident direction: zenith and azimuth of the source (uniform: any azimuth),
+# the entry rectangle (corner x, y and lengths [cells]), lines and rays, three random shifts
+# in [0, 1) (lines, offsets, azimuths), and the stream of random numbers of a diffuse base
+Source = namedtuple(
+    "Source",
+    "sin_theta cos_theta phi uniform_phi launch n_lines n_rays shifts stream",
+)
+
+
 @jit(inline="always")
 def fraction(x):
     """Part of x after the point."""
@@ -22,22 +32,21 @@ def fraction(x):
 
 
 @jit(inline="always")
-def entry_line(line, n_lines, launch, shifts, phi_i, uniform_phi, pitch_x, pitch_y):
+def entry_line(line, source, pitch_x, pitch_y):
     """One line of entry points, followed in the direction in which the light travels.
 
-    launch          corner x, y and lengths of the entry rectangle [cells]
-    shifts          random shifts (3,) in [0, 1): lines, offsets, azimuths
-
-    Returns the start (x, y), the speed per unit of s [cells], of which one component is +1 or
-    -1, the range of s, the length of a unit of s [um], the offset of the first ray in units of
-    the ray spacing, and cos and sin of the azimuth of the source.
+    Returns the start (x, y), the speed per unit of s [cells], of which one component is +1
+    or
+    -1, the range of s, the length of a unit of s [um], the offset of the first ray in units
+    of the ray spacing, and cos and sin of the azimuth of the source.
     """
-    phi = phi_i
-    if uniform_phi:
+    launch, shifts = source.launch, source.shifts
+    phi = source.phi
+    if source.uniform_phi:
         phi = TWO_PI * fraction(line * STRIDE_PHI + shifts[2])
     cos_phi = math.cos(phi)
     sin_phi = math.sin(phi)
-    across = (line + shifts[0]) / n_lines
+    across = (line + shifts[0]) / source.n_lines
     offset = fraction(line * STRIDE_OFFSET + shifts[1])
     down_x = -cos_phi / pitch_x
     down_y = -sin_phi / pitch_y
@@ -57,9 +66,9 @@ def entry_line(line, n_lines, launch, shifts, phi_i, uniform_phi, pitch_x, pitch
 
 
 @jit(inline="always")
-def first_ray(line, n_lines, n_rays):
+def first_ray(line, source):
     """Number of the first ray of a line; the rays are dealt evenly to the lines."""
-    return -((-line * n_rays) // n_lines)
+    return -((-line * source.n_rays) // source.n_lines)
 
 
 @jit(inline="always")

@@ -2,7 +2,8 @@
 
 A beam along the unit vector k has the frame (e_s, e_p = k x e_s). Turning the frame about k to
 a new s axis w needs the cosine and sine of twice the angle only; they follow from the
-projections of w on the old axes without its length: (a² - b²) / (a² + b²), 2 a b / (a² + b²).
+projections of w on the old axes without its length: (a² - b²) / (a² + b²), 2 a b / (a² +
+b²).
 """
 
 from pbrdf.kernels import jit

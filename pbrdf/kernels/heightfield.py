@@ -7,11 +7,11 @@ maxima lets a ray skip every block that it passes above.
 
 On its way through neighbouring cells the walk carries the clearance of the ray above the
 surface from facet to facet. A hit is a change of its sign, so that no ray can slip through
-an edge or a vertex, and a ray that starts on a facet needs no offset: its clearance there is
-t times its speed away from the facet, without cancellation.
+an edge or a vertex, and a ray that starts on a facet needs no offset: its clearance there
+is t times its speed away from the facet, without cancellation.
 """
 
-import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -22,6 +22,14 @@ FACET_LOW, FACET_HIGH = 0, 1  # the facet with u > v, and the one with u < v
 UNKNOWN = -1.0  # a clearance that was not followed
 NEVER = 1e300  # time per cell of a ray that does not move along an axis
 START_LEVEL = 3  # blocks of 8 cells: where a ray from above starts to look
+
+
+# A height field as the kernels take it: node heights, the pyramid of `block_maxima`, the
+# highest node, whether it repeats, the grid steps and the material of each cell (of no
+# size: all 0)
+Terrain = namedtuple(
+    "Terrain", "heights maxima levels z_top periodic pitch_x pitch_y labels"
+)
 
 
 def block_maxima(heights: np.ndarray, periodic: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -48,6 +56,15 @@ def block_maxima(heights: np.ndarray, periodic: bool) -> tuple[np.ndarray, np.nd
 
 
 @jit(inline="always")
+def cell_counts(terrain):
+    """Number of cells along x and y."""
+    nx, ny = terrain.heights.shape
+    if terrain.periodic:
+        return nx, ny
+    return nx - 1, ny - 1
+
+
+@jit(inline="always")
 def corner_heights(heights, i, j, periodic):
     """Heights of the corners (i, j), (i+1, j), (i, j+1), (i+1, j+1) of a cell."""
     i1 = i + 1
@@ -61,12 +78,19 @@ def corner_heights(heights, i, j, periodic):
 
 
 @jit(inline="always")
-def facet_gradient(heights, i, j, facet, periodic):
+def facet_steps(terrain, i, j, facet):
     """Height step per cell along x and y on one facet of cell (i, j)."""
-    z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
+    z00, z10, z01, z11 = corner_heights(terrain.heights, i, j, terrain.periodic)
     if facet == FACET_LOW:
         return z10 - z00, z11 - z10
     return z11 - z01, z01 - z00
+
+
+@jit(inline="always")
+def facet_slopes(terrain, i, j, facet):
+    """Slopes dz/dx and dz/dy of one facet of cell (i, j)."""
+    step_x, step_y = facet_steps(terrain, i, j, facet)
+    return step_x / terrain.pitch_x, step_y / terrain.pitch_y
 
 
 @jit(inline="always")
@@ -94,17 +118,15 @@ def fall(heights, periodic, i, j, u, v, z, speed_z):
 
 
 @jit(inline="always")
-def walk(
-    heights, maxima, levels, z_top, periodic,
-    i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, max_steps,
-):  # fmt: skip
+def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, max_steps):
     """Follow a ray from the place (u, v) of cell (i, j) at height z to the next facet it meets.
 
-    With facet >= 0 the ray starts on that facet and leaves it at `leave_rate` > 0 per unit of
-    t; with -1 it starts in free space. Returns (fate, i, j, facet, u, v, z).
+    With facet >= 0 the ray starts on that facet and leaves it at `leave_rate` > 0 per unit
+    of t; with -1 it starts in free space. Returns (fate, i, j, facet, u, v, z).
     """
-    nx = heights.shape[0] if periodic else heights.shape[0] - 1
-    ny = heights.shape[1] if periodic else heights.shape[1] - 1
+    heights, maxima, levels = terrain.heights, terrain.maxima, terrain.levels
+    periodic, z_top = terrain.periodic, terrain.z_top
+    nx, ny = cell_counts(terrain)
     if speed_x == 0.0 and speed_y == 0.0:
         return fall(heights, periodic, i, j, u, v, z, speed_z)
 

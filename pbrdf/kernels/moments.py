@@ -8,7 +8,8 @@ def add_sample(flux, scale, count, mean, scatter, mean_total, scatter_total):
     """Add the `count`-th sample to the running moments (Welford) and clear its tally.
 
     flux            tally of the sample (wavelengths, bounces, cells)
-    mean, scatter   the same shape; mean_total, scatter_total (wavelengths, cells) of all bounces
+    mean, scatter   the same shape; mean_total, scatter_total (wavelengths, cells) of all
+    bounces
     """
     for w in range(flux.shape[0]):
         for cell in range(flux.shape[2]):

@@ -1,20 +1,48 @@
 """Mueller matrix of a recorded path, and its place in the tally.
 
-A path is recorded as the cosine of the local incidence at each bounce and the turns of the
-frame before each bounce and at the exit. Materials and wavelengths share one record. Records of
-many rays lie in one array; `ray` is the column of the path at hand. (Elements are read one by one:
-a slice would cost more than the arithmetic on it.)
+A path is recorded bounce by bounce: the turn of the frame into the plane of incidence, the
+cosine of incidence, for a scattering by the base under the interface the cosine of exit,
+and the label of the material; the last record holds the turn into the frame of the exit
+direction. Wavelengths share one record. Records of many rays lie in one array (bounces + 1,
+rays, columns); `ray` is the one at hand. (Elements are read one by one: a slice would cost
+more than the arithmetic on it.)
 """
+
+from collections import namedtuple
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.binning import bin_of_direction
-from pbrdf.kernels.fresnel import reflection_elements
+from pbrdf.kernels.fresnel import reflection_elements, transmission_elements
+from pbrdf.kernels.volume import internal_reflectance
+
+# The substrate: index and `base_strength` by (wavelength, material), base of no width where
+# nothing is diffuse; n_stokes is 4 for (I, Q, U, V), 3 without V, 1 for I alone
+Optics = namedtuple("Optics", "n kappa base n_stokes")
+# The tally: `bin_edges`; flux by bin (wavelengths, bounces, n_theta, n_dphi, stokes,
+# stokes); energy (wavelengths, N_ENERGIES); counts (N_COUNTS,); room for one matrix (4, 4)
+Tally = namedtuple("Tally", "zenith azimuth flux energy counts mueller")
+
+# Columns of a record
+TURN_C, TURN_S, COS_IN, COS_OUT, LABEL, N_RECORD = 0, 1, 2, 3, 4, 5
+SPECULAR = -1.0  # in COS_OUT: mirror reflection
 
 # What became of the rays of a sample, the path segments they took, and the hits of a facet
 # just left (impossible but for rounding inside the intersector)
 N_ESCAPED, N_TRUNCATED, N_LEAKED, N_SIDE, N_SEGMENTS, N_SELF, N_COUNTS = 0, 1, 2, 3, 4, 5, 6
 # Energies of unpolarised light
-ABSORBED, TRUNCATED, LEAKED = 0, 1, 2
+ABSORBED, TRUNCATED, LEAKED, SIDEWAYS, N_ENERGIES = 0, 1, 2, 3, 4
+
+
+@jit
+def base_strength(albedo, n, kappa):
+    """Factor albedo / (n² (1 - albedo F_i)) of the two transmittances of a diffuse base.
+
+    A Lambertian base spreads its light over n² times the solid angle outside and gets back
+    the share F_i that the interface throws back; times cos(exit) / pi it is the BRDF.
+    """
+    if albedo == 0.0:
+        return 0.0
+    return albedo / (n * n * (1.0 - albedo * internal_reflectance(n, kappa)))
 
 
 @jit(inline="always")
@@ -41,81 +69,118 @@ def reflect_once(a, b, c, d, c_in, s_in, c_out, s_out, n_stokes, mueller):
         mueller[3, 3] = c
 
 
+@jit(inline="always")
+def reflect_column(a, b, c, d, column, mueller):
+    """One column of a matrix after Fresnel reflection, paper eq. (10)."""
+    i = mueller[0, column]
+    q = mueller[1, column]
+    u = mueller[2, column]
+    v = mueller[3, column]
+    mueller[0, column] = a * i + b * q
+    mueller[1, column] = b * i + a * q
+    mueller[2, column] = c * u - d * v
+    mueller[3, column] = d * u + c * v
+
+
+@jit(inline="always")
+def scatter_column(strength, a_in, b_in, a_out, b_out, column, mueller):
+    """One column after the base: in through the interface, depolarised, out through it."""
+    inside = strength * (a_in * mueller[0, column] + b_in * mueller[1, column])
+    mueller[0, column] = a_out * inside
+    mueller[1, column] = b_out * inside
+    mueller[2, column] = 0.0
+    mueller[3, column] = 0.0
+
+
 @jit
-def reflect_often(ray, bounces, cos_beta, turn, n, kappa, n_stokes, mueller):
-    """Mueller matrix of a path with any number of bounces, all its columns side by side."""
+def reflect_often(record, ray, bounces, w, optics, n_stokes, mueller):
+    """Mueller matrix of a path of any length, all its columns side by side."""
+    n, kappa, base = optics.n, optics.kappa, optics.base
     for row in range(4):
         for column in range(n_stokes):
             mueller[row, column] = 1.0 if row == column else 0.0
     for bounce in range(bounces + 1):
-        c2 = turn[bounce, ray, 0]
-        s2 = turn[bounce, ray, 1]
+        # Into the frame of the facet, or after the last bounce of the exit direction
+        c2 = record[bounce, ray, TURN_C]
+        s2 = record[bounce, ray, TURN_S]
         for column in range(n_stokes):
-            # Into the frame of the facet, or after the last bounce of the exit direction
             q = mueller[1, column]
             u = mueller[2, column]
             mueller[1, column] = c2 * q + s2 * u
             mueller[2, column] = c2 * u - s2 * q
         if bounce == bounces:
             break
-        a, b, c, d = reflection_elements(cos_beta[bounce, ray], n, kappa)
-        for column in range(n_stokes):
-            # Fresnel reflection
-            i = mueller[0, column]
-            q = mueller[1, column]
-            u = mueller[2, column]
-            v = mueller[3, column]
-            mueller[0, column] = a * i + b * q
-            mueller[1, column] = b * i + a * q
-            mueller[2, column] = c * u - d * v
-            mueller[3, column] = d * u + c * v
+        cos_in = record[bounce, ray, COS_IN]
+        cos_out = record[bounce, ray, COS_OUT]
+        m = int(record[bounce, ray, LABEL])
+        if cos_out == SPECULAR:
+            a, b, c, d = reflection_elements(cos_in, n[w, m], kappa[w, m])
+            for column in range(n_stokes):
+                reflect_column(a, b, c, d, column, mueller)
+        else:
+            a_in, b_in, _, _ = transmission_elements(cos_in, n[w, m], kappa[w, m])
+            a_out, b_out, _, _ = transmission_elements(cos_out, n[w, m], kappa[w, m])
+            for column in range(n_stokes):
+                scatter_column(base[w, m], a_in, b_in, a_out, b_out, column, mueller)
 
 
 @jit(inline="always")
-def path_mueller(ray, bounces, cos_beta, turn, n, kappa, n_stokes, mueller):
-    """Mueller matrix of a path, by the closed form where it has one bounce."""
-    if bounces == 1:
-        a, b, c, d = reflection_elements(cos_beta[0, ray], n, kappa)
+def path_mueller(record, ray, bounces, w, optics, n_stokes, mueller):
+    """Mueller matrix of a path, by the closed form where it has one mirror reflection."""
+    if bounces == 1 and record[0, ray, COS_OUT] == SPECULAR:
+        m = int(record[0, ray, LABEL])
+        a, b, c, d = reflection_elements(
+            record[0, ray, COS_IN], optics.n[w, m], optics.kappa[w, m]
+        )
         reflect_once(
-            a, b, c, d, turn[0, ray, 0], turn[0, ray, 1], turn[1, ray, 0], turn[1, ray, 1],
-            n_stokes, mueller,
+            a, b, c, d, record[0, ray, TURN_C], record[0, ray, TURN_S],
+            record[1, ray, TURN_C], record[1, ray, TURN_S], n_stokes, mueller,
         )  # fmt: skip
     else:
-        reflect_often(ray, bounces, cos_beta, turn, n, kappa, n_stokes, mueller)
+        reflect_often(record, ray, bounces, w, optics, n_stokes, mueller)
 
 
 @jit(inline="always")
 def tally_path(
-    end, rays, ray, bounces, cos_beta, turn, k_x, k_y, k_z, cos_phi_i, sin_phi_i,
-    n, kappa, n_stokes, zenith, azimuth, mueller, brdf, energy, counts,
+    end, record, ray, bounces, k_x, k_y, k_z, cos_phi_i, sin_phi_i, optics, tally
 ):  # fmt: skip
-    """Count a path that `rays` rays share and add its light to its bin, or to what was lost.
+    """Count a path and add its light to its bin, or to what was lost.
 
-    `end` is one of the N_ constants, `zenith` and `azimuth` are `bin_edges`; brdf, energy and
-    counts are added to.
+    `end` is one of the N_ constants. ABSORBED falls by what the path still carries: one
+    unit for each ray that enters is added elsewhere. Without a diffuse base a ray is one
+    path, and one that leaves a finite map sideways takes its unit back: it belongs to
+    neither part of the fraction.
     """
-    counts[end] += rays
-    counts[N_SEGMENTS] += rays * (bounces + 1)
-    # Rays that left a finite map sideways belong to neither part of the fraction
-    if end == N_SIDE:
+    flux, energy, mueller = tally.flux, tally.energy, tally.mueller
+    n_stokes = optics.n_stokes
+    tally.counts[end] += 1
+    if end == N_SIDE and optics.base.shape[1] == 0:
+        for w in range(energy.shape[0]):
+            energy[w, ABSORBED] -= 1.0
         return
     if end != N_ESCAPED:
-        lost = TRUNCATED if end == N_TRUNCATED else LEAKED
-        for w in range(n.shape[0]):
-            path_mueller(ray, bounces, cos_beta, turn, n[w], kappa[w], 1, mueller)
-            energy[w, ABSORBED] += rays * (1.0 - mueller[0, 0])
-            energy[w, lost] += rays * mueller[0, 0]
+        lost = LEAKED
+        if end == N_TRUNCATED:
+            lost = TRUNCATED
+        elif end == N_SIDE:
+            lost = SIDEWAYS
+        for w in range(energy.shape[0]):
+            path_mueller(record, ray, bounces, w, optics, 1, mueller)
+            energy[w, ABSORBED] -= mueller[0, 0]
+            energy[w, lost] += mueller[0, 0]
         return
-    i_theta, i_dphi = bin_of_direction(k_x, k_y, k_z, cos_phi_i, sin_phi_i, zenith, azimuth)
-    order = min(bounces, brdf.shape[1]) - 1
-    for w in range(n.shape[0]):
-        path_mueller(ray, bounces, cos_beta, turn, n[w], kappa[w], n_stokes, mueller)
-        energy[w, ABSORBED] += rays * (1.0 - mueller[0, 0])
+    i_theta, i_dphi = bin_of_direction(
+        k_x, k_y, k_z, cos_phi_i, sin_phi_i, tally.zenith, tally.azimuth
+    )
+    order = min(bounces, flux.shape[1]) - 1
+    for w in range(energy.shape[0]):
+        path_mueller(record, ray, bounces, w, optics, n_stokes, mueller)
+        energy[w, ABSORBED] -= mueller[0, 0]
         if n_stokes == 4:
             for row in range(4):
                 for column in range(4):
-                    brdf[w, order, i_theta, i_dphi, row, column] += rays * mueller[row, column]
+                    flux[w, order, i_theta, i_dphi, row, column] += mueller[row, column]
         else:
             for row in range(n_stokes):
                 for column in range(n_stokes):
-                    brdf[w, order, i_theta, i_dphi, row, column] += rays * mueller[row, column]
+                    flux[w, order, i_theta, i_dphi, row, column] += mueller[row, column]

@@ -1,7 +1,9 @@
 """Rays from the source to the bins over an opaque height field, one path after another.
 
-The path depends on the facets alone; `pbrdf.kernels.shading` then multiplies the Fresnel
-matrices of each material or wavelength along its record.
+The path depends on the facets alone; `pbrdf.kernels.shading` then multiplies the matrices
+of each material or wavelength along its record. Over a diffuse base every hit sends out a
+second ray, in a random direction; it waits until the mirror reflections are done and shares
+the record up to its own hit.
 """
 
 import math
@@ -9,8 +11,7 @@ import math
 import numpy as np
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.binning import bin_edges
-from pbrdf.kernels.entry import entry_line, first_ray, wrap_into
+from pbrdf.kernels.entry import TWO_PI, entry_line, first_ray, wrap_into
 from pbrdf.kernels.frames import PARALLEL, turn_frame
 from pbrdf.kernels.heightfield import (
     ESCAPED,
@@ -20,15 +21,35 @@ from pbrdf.kernels.heightfield import (
     NEVER,
     SIDE,
     corner_heights,
-    facet_gradient,
+    facet_slopes,
     plane_height,
     walk,
 )
-from pbrdf.kernels.shading import N_ESCAPED, N_LEAKED, N_SIDE, N_TRUNCATED, tally_path
+from pbrdf.kernels.random import uniform_pair
+from pbrdf.kernels.shading import (
+    ABSORBED,
+    COS_IN,
+    COS_OUT,
+    LABEL,
+    N_ESCAPED,
+    N_LEAKED,
+    N_RECORD,
+    N_SEGMENTS,
+    N_SIDE,
+    N_TRUNCATED,
+    SPECULAR,
+    TURN_C,
+    TURN_S,
+    tally_path,
+)
 
 MAX_STEPS = 10_000_000
 # Smallest cosine of a hit: rounding may leave a grazing ray parallel to the facet it meets
 GRAZING = 1e-15
+# Columns of a waiting ray: cell, facet, place, direction, s axis, leave rate, cosine of
+# exit
+W_I, W_J, W_FACET, W_U, W_V, W_Z, W_KX, W_KY, W_KZ = 0, 1, 2, 3, 4, 5, 6, 7, 8
+W_SX, W_SY, W_SZ, W_RATE, W_COS, W_BOUNCE, N_WAITING = 9, 10, 11, 12, 13, 14, 15
 
 
 @jit(inline="always")
@@ -82,126 +103,187 @@ def exit_turn(k_x, k_y, k_z, s_x, s_y, s_z, cos_phi_i, sin_phi_i):
     return turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, m_x, m_y, 0.0)
 
 
+@jit
+def scatter(slope_x, slope_y, draw_a, draw_b):
+    """Direction spread as the cosine about a facet's normal, from two uniform numbers.
+
+    Returns the direction, its s axis k x n, the speed at which the ray leaves the facet
+    upwards and the cosine of exit.
+    """
+    length = math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
+    n_x = -slope_x / length
+    n_y = -slope_y / length
+    n_z = 1.0 / length
+    # Axes across the normal (Duff et al. 2017); a facet never faces down
+    share = -1.0 / (1.0 + n_z)
+    mixed = n_x * n_y * share
+    sine = math.sqrt(draw_a)
+    cosine = max(math.sqrt(1.0 - draw_a), GRAZING)
+    a = sine * math.cos(TWO_PI * draw_b)
+    b = sine * math.sin(TWO_PI * draw_b)
+    k_x = a * (1.0 + n_x * n_x * share) + b * mixed + cosine * n_x
+    k_y = a * mixed + b * (1.0 + n_y * n_y * share) + cosine * n_y
+    k_z = -a * n_x - b * n_y + cosine * n_z
+    s_x = k_y * n_z - k_z * n_y
+    s_y = k_z * n_x - k_x * n_z
+    s_z = k_x * n_y - k_y * n_x
+    square = s_x * s_x + s_y * s_y + s_z * s_z
+    if square > PARALLEL:
+        scale = 1.0 / math.sqrt(square)
+        s_x *= scale
+        s_y *= scale
+        s_z *= scale
+    else:
+        # Along the normal every axis across it serves
+        s_x, s_y, s_z = 1.0 + n_x * n_x * share, mixed, -n_x
+    return k_x, k_y, k_z, s_x, s_y, s_z, cosine * length, cosine
+
+
 @jit(inline="always")
-def follow_path(
-    heights, maxima, levels, z_top, periodic, pitch_x, pitch_y,
-    fate, i, j, facet, u, v, z, cos_phi, sin_phi, sin_theta_i, cos_theta_i,
-    max_bounces, cos_beta, turn,
+def trace_ray(
+    terrain, fate, i, j, facet, u, v, z, cos_phi, sin_phi, source, number,
+    record, waiting, optics, tally,
 ):  # fmt: skip
-    """Follow a ray from its first meeting with the surface until it leaves for good.
+    """Follow a ray from its first meeting with the surface until all its light has left.
 
     `fate` says what became of it so far: HIT on the facet given, or what `walk` returned.
-    Fills column 0 of `cos_beta` (bounces, 1) and `turn` (bounces + 1, 1, 2). Returns the count to which the path
-    belongs, the number of bounces and the exit direction.
     """
+    pitch_x, pitch_y, labels = terrain.pitch_x, terrain.pitch_y, terrain.labels
+    max_bounces = record.shape[0] - 1
+    splits = optics.base.shape[1] > 0
+    for w in range(tally.energy.shape[0]):
+        tally.energy[w, ABSORBED] += 1.0
+    tally.counts[N_SEGMENTS] += 1
     # The beam travels against dir_i; its frame has e_s horizontal
-    k_x = -sin_theta_i * cos_phi
-    k_y = -sin_theta_i * sin_phi
-    k_z = -cos_theta_i
+    k_x = -source.sin_theta * cos_phi
+    k_y = -source.sin_theta * sin_phi
+    k_z = -source.cos_theta
     s_x = sin_phi
     s_y = -cos_phi
     s_z = 0.0
     bounces = 0
-    while fate == HIT and bounces < max_bounces:
-        step_x, step_y = facet_gradient(heights, i, j, facet, periodic)
-        k_x, k_y, k_z, s_x, s_y, s_z, leave_rate, cosine, c2, s2 = bounce(
-            k_x, k_y, k_z, s_x, s_y, s_z, step_x / pitch_x, step_y / pitch_y
-        )
-        cos_beta[bounces, 0] = cosine
-        turn[bounces, 0, 0] = c2
-        turn[bounces, 0, 1] = s2
-        bounces += 1
-        fate, i, j, facet, u, v, z = walk(
-            heights, maxima, levels, z_top, periodic,
-            i, j, facet, u, v, z, k_x / pitch_x, k_y / pitch_y, k_z, leave_rate, MAX_STEPS,
-        )  # fmt: skip
+    n_waiting = 0
+    events = 0
+    while True:
+        while fate == HIT and bounces < max_bounces:
+            slope_x, slope_y = facet_slopes(terrain, i, j, facet)
+            if splits:
+                # A second ray leaves the base under the interface
+                draw_a, draw_b = uniform_pair(source.stream, number, events)
+                events += 1
+                waiting[n_waiting, W_I] = i
+                waiting[n_waiting, W_J] = j
+                waiting[n_waiting, W_FACET] = facet
+                waiting[n_waiting, W_U] = u
+                waiting[n_waiting, W_V] = v
+                waiting[n_waiting, W_Z] = z
+                waiting[n_waiting, W_BOUNCE] = bounces
+                (
+                    waiting[n_waiting, W_KX], waiting[n_waiting, W_KY], waiting[n_waiting, W_KZ],
+                    waiting[n_waiting, W_SX], waiting[n_waiting, W_SY], waiting[n_waiting, W_SZ],
+                    waiting[n_waiting, W_RATE], waiting[n_waiting, W_COS],
+                ) = scatter(slope_x, slope_y, draw_a, draw_b)  # fmt: skip
+                n_waiting += 1
+            (
+                k_x, k_y, k_z, s_x, s_y, s_z, leave_rate,
+                record[bounces, 0, COS_IN], record[bounces, 0, TURN_C], record[bounces, 0, TURN_S],
+            ) = bounce(k_x, k_y, k_z, s_x, s_y, s_z, slope_x, slope_y)  # fmt: skip
+            record[bounces, 0, COS_OUT] = SPECULAR
+            record[bounces, 0, LABEL] = labels[i, j] if labels.size > 0 else 0
+            bounces += 1
+            tally.counts[N_SEGMENTS] += 1
+            fate, i, j, facet, u, v, z = walk(
+                terrain, i, j, facet, u, v, z,
+                k_x / pitch_x, k_y / pitch_y, k_z, leave_rate, MAX_STEPS,
+            )  # fmt: skip
 
-    c2, s2 = exit_turn(k_x, k_y, k_z, s_x, s_y, s_z, cos_phi, sin_phi)
-    turn[bounces, 0, 0] = c2
-    turn[bounces, 0, 1] = s2
-    count = N_LEAKED
-    if fate == HIT:
-        count = N_TRUNCATED
-    elif fate == SIDE:
-        count = N_SIDE
-    elif fate == ESCAPED and bounces > 0:
-        count = N_ESCAPED
-    return count, bounces, k_x, k_y, k_z
+        record[bounces, 0, TURN_C], record[bounces, 0, TURN_S] = exit_turn(
+            k_x, k_y, k_z, s_x, s_y, s_z, cos_phi, sin_phi
+        )
+        end = N_LEAKED
+        if fate == HIT:
+            end = N_TRUNCATED
+        elif fate == SIDE:
+            end = N_SIDE
+        elif fate == ESCAPED and bounces > 0:
+            end = N_ESCAPED
+        tally_path(end, record, 0, bounces, k_x, k_y, k_z, cos_phi, sin_phi, optics, tally)
+        if n_waiting == 0:
+            break
+
+        # The last ray that waits: its record up to its hit is still in place
+        n_waiting -= 1
+        k_x = waiting[n_waiting, W_KX]
+        k_y = waiting[n_waiting, W_KY]
+        k_z = waiting[n_waiting, W_KZ]
+        s_x = waiting[n_waiting, W_SX]
+        s_y = waiting[n_waiting, W_SY]
+        s_z = waiting[n_waiting, W_SZ]
+        bounces = int(waiting[n_waiting, W_BOUNCE])
+        record[bounces, 0, COS_OUT] = waiting[n_waiting, W_COS]
+        bounces += 1
+        tally.counts[N_SEGMENTS] += 1
+        fate, i, j, facet, u, v, z = walk(
+            terrain, int(waiting[n_waiting, W_I]), int(waiting[n_waiting, W_J]),
+            int(waiting[n_waiting, W_FACET]), waiting[n_waiting, W_U],
+            waiting[n_waiting, W_V], waiting[n_waiting, W_Z], k_x / pitch_x, k_y / pitch_y, k_z,
+            waiting[n_waiting, W_RATE], MAX_STEPS,
+        )  # fmt: skip
 
 
 @jit
-def trace_batch(
-    heights, maxima, levels, z_top, periodic, pitch_x, pitch_y, launch, n_lines,
-    sin_theta_i, cos_theta_i, phi_i, uniform_phi, n_rays, shifts, max_bounces,
-    n, kappa, n_stokes, brdf, energy, counts,
-):  # fmt: skip
-    """Trace rays of one incident direction and add their Mueller matrices to the bins.
+def trace_batch(terrain, source, max_bounces, optics, tally):
+    """Trace rays of one incident direction and add their Mueller matrices to the tally.
 
     Every ray walks from its entry point in the top plane; see `sweep_batch`.
-
-    launch, n_lines, shifts  entry rectangle, lines and random shifts of `entry_line`
-    n, kappa        refractive index (wavelengths,)
-    brdf            flux by bin (wavelengths, bounces, n_theta, n_dphi, stokes, stokes), added to
-    energy          (wavelengths, 3), by what took it: ABSORBED, TRUNCATED, LEAKED, added to
-    counts          rays by fate, path segments and self hits (6,), added to
     """
-    cos_beta = np.empty((max_bounces, 1))
-    turn = np.empty((max_bounces + 1, 1, 2))
-    mueller = np.zeros((4, 4))
-    zenith, azimuth = bin_edges(brdf.shape[2], brdf.shape[3])
-    for line in range(n_lines):
-        start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = entry_line(
-            line, n_lines, launch, shifts, phi_i, uniform_phi, pitch_x, pitch_y
+    launch = source.launch
+    record = np.empty((max_bounces + 1, 1, N_RECORD))
+    waiting = np.empty((max_bounces, N_WAITING))
+    for line in range(source.n_lines):
+        start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = (
+            entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
         )
-        first = first_ray(line, n_lines, n_rays)
-        rays = first_ray(line + 1, n_lines, n_rays) - first
+        first = first_ray(line, source)
+        rays = first_ray(line + 1, source) - first
         for ray in range(rays):
             s = length * ((ray + offset) / rays)
             x = wrap_into(start_x + speed_x * s, launch[0], launch[2])
             y = wrap_into(start_y + speed_y * s, launch[1], launch[3])
-            i = min(int(x), heights.shape[0] - 1)
-            j = min(int(y), heights.shape[1] - 1)
+            i = min(int(x), terrain.heights.shape[0] - 1)
+            j = min(int(y), terrain.heights.shape[1] - 1)
             fate, i, j, facet, u, v, z = walk(
-                heights, maxima, levels, z_top, periodic, i, j, -1, x - i, y - j, z_top,
-                -sin_theta_i * cos_phi / pitch_x, -sin_theta_i * sin_phi / pitch_y,
-                -cos_theta_i, 0.0, MAX_STEPS,
+                terrain, i, j, -1, x - i, y - j, terrain.z_top,
+                -source.sin_theta * cos_phi / terrain.pitch_x,
+                -source.sin_theta * sin_phi / terrain.pitch_y,
+                -source.cos_theta, 0.0, MAX_STEPS,
             )  # fmt: skip
-            count, bounces, k_x, k_y, k_z = follow_path(
-                heights, maxima, levels, z_top, periodic, pitch_x, pitch_y,
-                fate, i, j, facet, u, v, z, cos_phi, sin_phi, sin_theta_i, cos_theta_i,
-                max_bounces, cos_beta, turn,
-            )  # fmt: skip
-            tally_path(
-                count, 1, 0, bounces, cos_beta, turn, k_x, k_y, k_z, cos_phi, sin_phi,
-                n, kappa, n_stokes, zenith, azimuth, mueller, brdf, energy, counts,
+            trace_ray(
+                terrain, fate, i, j, facet, u, v, z, cos_phi, sin_phi, source, first + ray,
+                record, waiting, optics, tally,
             )  # fmt: skip
 
 
 @jit
-def sweep_batch(
-    heights, maxima, levels, z_top, periodic, pitch_x, pitch_y, launch, n_lines,
-    sin_theta_i, cos_theta_i, phi_i, uniform_phi, n_rays, shifts, max_bounces,
-    n, kappa, n_stokes, brdf, energy, counts,
-):  # fmt: skip
+def sweep_batch(terrain, source, max_bounces, optics, tally):
     """`trace_batch` over a periodic field, without a search for the first facets.
 
     The rays of a line travel in one vertical plane. There a ray is the line of constant
-    s + (z - z_top) tan(theta_i) / unit; the first point of the surface, in the direction of the
-    light, at which this lag reaches the ray's value is where the ray arrives. One pass along
-    the surface thus serves all rays of the line in their order.
+    s + (z - z_top) tan(theta_i) / unit; the first point of the surface, in the direction of
+    the light, at which this lag reaches the ray's value is where the ray arrives. One pass
+    along the surface thus serves all rays of the line in their order.
     """
-    nx, ny = heights.shape
-    cos_beta = np.empty((max_bounces, 1))
-    turn = np.empty((max_bounces + 1, 1, 2))
-    mueller = np.zeros((4, 4))
-    zenith, azimuth = bin_edges(brdf.shape[2], brdf.shape[3])
-    for line in range(n_lines):
-        start_x, start_y, speed_x, speed_y, length, unit, offset, cos_phi, sin_phi = entry_line(
-            line, n_lines, launch, shifts, phi_i, uniform_phi, pitch_x, pitch_y
+    nx, ny = terrain.heights.shape
+    z_top = terrain.z_top
+    record = np.empty((max_bounces + 1, 1, N_RECORD))
+    waiting = np.empty((max_bounces, N_WAITING))
+    for line in range(source.n_lines):
+        start_x, start_y, speed_x, speed_y, length, unit, offset, cos_phi, sin_phi = (
+            entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
         )
-        first = first_ray(line, n_lines, n_rays)
-        rays = first_ray(line + 1, n_lines, n_rays) - first
-        drift = sin_theta_i / cos_theta_i / unit  # in s per height
+        first = first_ray(line, source)
+        rays = first_ray(line + 1, source) - first
+        drift = source.sin_theta / source.cos_theta / unit  # in s per height
         forward_x = speed_x >= 0.0
         forward_y = speed_y >= 0.0
         per_x = 1.0 / speed_x if speed_x != 0.0 else NEVER
@@ -217,7 +299,7 @@ def sweep_batch(
             t_x = (i + (1 if forward_x else 0) - x0) * per_x
             t_y = (j + (1 if forward_y else 0) - y0) * per_y
             s_out = max(min(t_x, t_y), s)
-            z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
+            z00, z10, z01, z11 = corner_heights(terrain.heights, i, j, True)
             highest = max(max(z00, z10), max(z01, z11))
             if s_out + (highest - z_top) * drift >= lag:
                 # The light reaches into this cell: through its one or two facets
@@ -247,16 +329,11 @@ def sweep_batch(
                         share = 0.0
                         if lag_b > lag_a:
                             share = min(max((lag - lag_a) / (lag_b - lag_a), 0.0), 1.0)
-                        count, bounces, k_x, k_y, k_z = follow_path(
-                            heights, maxima, levels, z_top, periodic, pitch_x, pitch_y,
-                            HIT, i, j, facet, u_a + share * (u_b - u_a),
+                        trace_ray(
+                            terrain, HIT, i, j, facet, u_a + share * (u_b - u_a),
                             v_a + share * (v_b - v_a), z_a + share * (z_b - z_a),
-                            cos_phi, sin_phi, sin_theta_i, cos_theta_i,
-                            max_bounces, cos_beta, turn,
-                        )  # fmt: skip
-                        tally_path(
-                            count, 1, 0, bounces, cos_beta, turn, k_x, k_y, k_z, cos_phi, sin_phi,
-                            n, kappa, n_stokes, zenith, azimuth, mueller, brdf, energy, counts,
+                            cos_phi, sin_phi, source, first + ray,
+                            record, waiting, optics, tally,
                         )  # fmt: skip
                         ray += 1
                         lag = length * ((ray + offset) / rays)

@@ -1,43 +1,77 @@
 """Rays from the source to the bins in batches, for an intersector that answers for batches.
 
-The same physics as `pbrdf.kernels.transport`, with the walk replaced by calls of Embree. A ray
-keeps its exact place (cell, facet, u, v, height) in float64; only the copy handed to Embree is
-float32 and lifted off its facet along the normal. A hit facet returns as a number; where on its
-plane the ray arrives follows in float64.
+The same physics as `pbrdf.kernels.transport`, with the walk replaced by calls of Embree. A
+ray keeps its exact place (cell, facet, u, v, height) in float64; only the copy handed to
+Embree is float32 and lifted off its facet along the normal. A hit facet returns as a
+number; where on its plane the ray arrives follows in float64.
 """
 
 import math
+from collections import namedtuple
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.heightfield import facet_gradient
-from pbrdf.kernels.shading import N_ESCAPED, N_LEAKED, N_SELF, N_SIDE, N_TRUNCATED, tally_path
 from pbrdf.kernels.entry import entry_line, first_ray, wrap_into
+from pbrdf.kernels.heightfield import cell_counts, facet_slopes, facet_steps
+from pbrdf.kernels.shading import (
+    ABSORBED,
+    COS_IN,
+    COS_OUT,
+    LABEL,
+    N_ESCAPED,
+    N_LEAKED,
+    N_SEGMENTS,
+    N_SELF,
+    N_SIDE,
+    N_TRUNCATED,
+    SPECULAR,
+    TURN_C,
+    TURN_S,
+    tally_path,
+)
 from pbrdf.kernels.transport import bounce, exit_turn
 
 # Columns of a ray's state: place in cell, height, direction, s axis, azimuth of the source
-U, V, Z, KX, KY, KZ, SX, SY, SZ, COS_PHI, SIN_PHI, N_STATE = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
-# Columns of a ray's cell: i, j, facet (-1 in free space), face it left, bounces
+U, V, Z, KX, KY, KZ, SX, SY, SZ, COS_PHI, SIN_PHI, N_STATE = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+    9,
+    10,
+    11,
+)
+# Columns of a ray's cell: i, j, facet (-1 in free space), face it left (-1: none), bounces
 CELL_I, CELL_J, FACET, FACE, BOUNCES, N_CELL = 0, 1, 2, 3, 4, 5
+ENTERING = -2  # face left by a ray that has met nothing yet
+
+
+# How the mesh lies: centre in cells, cells and height, length of its unit, lift of a ray
+# off its facet in units, cells of the guard band, and the lowest height
+MeshFrame = namedtuple(
+    "MeshFrame", "center_x center_y center_z unit offset guard_x guard_y z_bottom"
+)
 
 
 @jit
-def enter_rays(
-    first, n_rays, launch, n_lines, shifts, pitch_x, pitch_y,
-    sin_theta_i, cos_theta_i, phi_i, uniform_phi, z_top, nx, ny, state, cell, active,
-):  # fmt: skip
+def enter_rays(terrain, source, first, state, cell, active):
     """Put rays `first`, first + 1 ... of a batch at their entry points in the top plane."""
+    launch = source.launch
+    nx, ny = cell_counts(terrain)
     line = -1
     start = 0
     end = 0
     for k in range(active.shape[0]):
         if first + k >= end:
-            line = ((first + k) * n_lines) // n_rays
-            start = first_ray(line, n_lines, n_rays)
-            end = first_ray(line + 1, n_lines, n_rays)
+            line = ((first + k) * source.n_lines) // source.n_rays
+            start = first_ray(line, source)
+            end = first_ray(line + 1, source)
             start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = (
-                entry_line(
-                    line, n_lines, launch, shifts, phi_i, uniform_phi, pitch_x, pitch_y
-                )
+                entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
             )
         s = length * ((first + k - start + offset) / (end - start))
         x = wrap_into(start_x + speed_x * s, launch[0], launch[2])
@@ -46,43 +80,39 @@ def enter_rays(
         j = min(int(y), ny - 1)
         state[k, U] = x - i
         state[k, V] = y - j
-        state[k, Z] = z_top
+        state[k, Z] = terrain.z_top
         state[k, COS_PHI] = cos_phi
         state[k, SIN_PHI] = sin_phi
-        state[k, KX] = -sin_theta_i * state[k, COS_PHI]
-        state[k, KY] = -sin_theta_i * state[k, SIN_PHI]
-        state[k, KZ] = -cos_theta_i
+        state[k, KX] = -source.sin_theta * state[k, COS_PHI]
+        state[k, KY] = -source.sin_theta * state[k, SIN_PHI]
+        state[k, KZ] = -source.cos_theta
         state[k, SX] = state[k, SIN_PHI]
         state[k, SY] = -state[k, COS_PHI]
         state[k, SZ] = 0.0
         cell[k, CELL_I] = i
         cell[k, CELL_J] = j
         cell[k, FACET] = -1
-        cell[k, FACE] = -1
+        cell[k, FACE] = ENTERING
         cell[k, BOUNCES] = 0
         active[k] = k
 
 
 @jit
-def emit_rays(
-    heights, periodic, pitch_x, pitch_y, center_x, center_y, center_z, unit, offset,
-    state, cell, active, origins, directions,
-):  # fmt: skip
+def emit_rays(terrain, frame, state, cell, active, origins, directions):
     """Write the active rays as Embree takes them: centred, in units of a cell, float32."""
+    pitch_x, pitch_y, unit = terrain.pitch_x, terrain.pitch_y, frame.unit
     for a in range(active.shape[0]):
         k = active[a]
         i = cell[k, CELL_I]
         j = cell[k, CELL_J]
-        x = (i + state[k, U] - center_x) * pitch_x / unit
-        y = (j + state[k, V] - center_y) * pitch_y / unit
-        z = (state[k, Z] - center_z) / unit
+        x = (i + state[k, U] - frame.center_x) * pitch_x / unit
+        y = (j + state[k, V] - frame.center_y) * pitch_y / unit
+        z = (state[k, Z] - frame.center_z) / unit
         facet = cell[k, FACET]
         if facet >= 0:
             # Lift the ray off its facet along the normal
-            step_x, step_y = facet_gradient(heights, i, j, facet, periodic)
-            slope_x = step_x / pitch_x
-            slope_y = step_y / pitch_y
-            lift = offset / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
+            slope_x, slope_y = facet_slopes(terrain, i, j, facet)
+            lift = frame.offset / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
             x -= slope_x * lift
             y -= slope_y * lift
             z += lift
@@ -95,17 +125,18 @@ def emit_rays(
 
 
 @jit
-def arrive_on_facet(heights, periodic, pitch_x, pitch_y, i, j, facet, k, state, column, row):
+def arrive_on_facet(terrain, i, j, facet, k, state, column, row):
     """Place (u, v, z) where a ray from cell (i, j) meets a facet of the cell (column, row).
 
     The cell is given without wrapping, so that it lies where the ray arrives.
     """
-    nx, ny = heights.shape
-    ci = column % nx if periodic else column
-    cj = row % ny if periodic else row
-    step_x, step_y = facet_gradient(heights, ci, cj, facet, periodic)
-    speed_x = state[k, KX] / pitch_x
-    speed_y = state[k, KY] / pitch_y
+    heights = terrain.heights
+    nx, ny = cell_counts(terrain)
+    ci = column % nx
+    cj = row % ny
+    step_x, step_y = facet_steps(terrain, ci, cj, facet)
+    speed_x = state[k, KX] / terrain.pitch_x
+    speed_y = state[k, KY] / terrain.pitch_y
     # Clearance above the facet's plane, and how fast it shrinks
     u = i + state[k, U] - column
     v = j + state[k, V] - row
@@ -121,40 +152,56 @@ def arrive_on_facet(heights, periodic, pitch_x, pitch_y, i, j, facet, k, state, 
 
 
 @jit
-def leave_domain(pitch_x, pitch_y, i, j, k, state, low_x, low_y, high_x, high_y):
+def leave_mesh(terrain, frame, i, j, k, state):
     """Time at which a ray that hits nothing leaves the rectangle of the mesh."""
+    nx, ny = cell_counts(terrain)
+    low_x, high_x = -frame.guard_x, nx + frame.guard_x
+    low_y, high_y = -frame.guard_y, ny + frame.guard_y
     t = math.inf
     x = i + state[k, U]
     y = j + state[k, V]
     if state[k, KX] != 0.0:
-        t = min(t, ((high_x if state[k, KX] > 0.0 else low_x) - x) * pitch_x / state[k, KX])
+        t = min(
+            t,
+            ((high_x if state[k, KX] > 0.0 else low_x) - x)
+            * terrain.pitch_x
+            / state[k, KX],
+        )
     if state[k, KY] != 0.0:
-        t = min(t, ((high_y if state[k, KY] > 0.0 else low_y) - y) * pitch_y / state[k, KY])
+        t = min(
+            t,
+            ((high_y if state[k, KY] > 0.0 else low_y) - y)
+            * terrain.pitch_y
+            / state[k, KY],
+        )
     return max(t, 0.0)
 
 
 @jit
-def advance_rays(
-    heights, periodic, pitch_x, pitch_y, z_top, z_bottom, guard_x, guard_y, faces, max_bounces,
-    state, cell, active, cos_beta, turn,
-    n, kappa, n_stokes, zenith, azimuth, mueller, brdf, energy, counts,
-):  # fmt: skip
+def advance_rays(terrain, frame, faces, state, cell, active, record, optics, tally):
     """Take the active rays through the answers of Embree, and tally those whose path ends.
 
     faces       face hit by each active ray, -1 for none
-    cos_beta, turn  records of the rays (bounces, chunk), (bounces + 1, chunk, 2)
+    record      records of the rays (bounces + 1, chunk, columns)
 
-    Keeps the rays that travel on at the front of `active`, in their order, and returns their
-    number.
+    Keeps the rays that travel on at the front of `active`, in their order, and returns
+    their number.
     """
-    nx = heights.shape[0] if periodic else heights.shape[0] - 1
-    ny = heights.shape[1] if periodic else heights.shape[1] - 1
+    labels, energy, counts = terrain.labels, tally.energy, tally.counts
+    max_bounces = record.shape[0] - 1
+    nx, ny = cell_counts(terrain)
+    guard_x, guard_y = frame.guard_x, frame.guard_y
     mesh_ny = ny + 2 * guard_y
     kept = 0
     for a in range(active.shape[0]):
         k = active[a]
         bounces = cell[k, BOUNCES]
         end = -1
+        if cell[k, BOUNCES] == 0 and cell[k, FACE] == ENTERING:
+            for w in range(energy.shape[0]):
+                energy[w, ABSORBED] += 1.0
+            counts[N_SEGMENTS] += 1
+            cell[k, FACE] = -1
         face = faces[a]
         if face >= 0 and face == cell[k, FACE]:
             counts[N_SELF] += 1
@@ -166,8 +213,7 @@ def advance_rays(
             row = (face // 2) % mesh_ny - guard_y
             facet = face % 2
             i, j, u, v, z = arrive_on_facet(
-                heights, periodic, pitch_x, pitch_y,
-                cell[k, CELL_I], cell[k, CELL_J], facet, k, state, column, row,
+                terrain, cell[k, CELL_I], cell[k, CELL_J], facet, k, state, column, row,
             )  # fmt: skip
             state[k, U] = u
             state[k, V] = v
@@ -176,32 +222,36 @@ def advance_rays(
             cell[k, CELL_J] = j
             cell[k, FACET] = facet
             cell[k, FACE] = 2 * ((i + guard_x) * mesh_ny + j + guard_y) + facet
-            step_x, step_y = facet_gradient(heights, i, j, facet, periodic)
+            slope_x, slope_y = facet_slopes(terrain, i, j, facet)
             (
                 state[k, KX], state[k, KY], state[k, KZ], state[k, SX], state[k, SY], state[k, SZ],
-                _, cos_beta[bounces, k], turn[bounces, k, 0], turn[bounces, k, 1],
+                _, record[bounces, k, COS_IN], record[bounces, k, TURN_C], record[bounces, k, TURN_S],
             ) = bounce(
                 state[k, KX], state[k, KY], state[k, KZ], state[k, SX], state[k, SY], state[k, SZ],
-                step_x / pitch_x, step_y / pitch_y,
+                slope_x, slope_y,
             )  # fmt: skip
+            record[bounces, k, COS_OUT] = SPECULAR
+            record[bounces, k, LABEL] = labels[i, j] if labels.size > 0 else 0
             cell[k, BOUNCES] = bounces + 1
+            counts[N_SEGMENTS] += 1
         else:
             # Nothing was hit: the ray rises above the surface, or leaves the mesh below it
-            t = leave_domain(
-                pitch_x, pitch_y, cell[k, CELL_I], cell[k, CELL_J], k, state,
-                -guard_x, -guard_y, nx + guard_x, ny + guard_y,
-            )  # fmt: skip
+            t = leave_mesh(terrain, frame, cell[k, CELL_I], cell[k, CELL_J], k, state)
             height = state[k, Z] + state[k, KZ] * t if state[k, KZ] != 0.0 else state[k, Z]
-            if state[k, KZ] > 0.0 and height >= z_top:
+            if state[k, KZ] > 0.0 and height >= terrain.z_top:
                 end = N_ESCAPED if bounces > 0 else N_LEAKED
-            elif not periodic:
+            elif not terrain.periodic:
                 end = N_SIDE
-            elif height < z_bottom:
+            elif height < frame.z_bottom:
                 end = N_LEAKED
             else:
                 # Onwards from the same place one period back
-                x = (cell[k, CELL_I] + state[k, U] + state[k, KX] * t / pitch_x) % nx
-                y = (cell[k, CELL_J] + state[k, V] + state[k, KY] * t / pitch_y) % ny
+                x = (
+                    cell[k, CELL_I] + state[k, U] + state[k, KX] * t / terrain.pitch_x
+                ) % nx
+                y = (
+                    cell[k, CELL_J] + state[k, V] + state[k, KY] * t / terrain.pitch_y
+                ) % ny
                 cell[k, CELL_I] = min(int(x), nx - 1)
                 cell[k, CELL_J] = min(int(y), ny - 1)
                 cell[k, FACET] = -1
@@ -213,13 +263,12 @@ def advance_rays(
             active[kept] = k
             kept += 1
             continue
-        turn[bounces, k, 0], turn[bounces, k, 1] = exit_turn(
+        record[bounces, k, TURN_C], record[bounces, k, TURN_S] = exit_turn(
             state[k, KX], state[k, KY], state[k, KZ], state[k, SX], state[k, SY], state[k, SZ],
             state[k, COS_PHI], state[k, SIN_PHI],
         )  # fmt: skip
         tally_path(
-            end, 1, k, bounces, cos_beta, turn, state[k, KX], state[k, KY], state[k, KZ],
-            state[k, COS_PHI], state[k, SIN_PHI], n, kappa, n_stokes, zenith, azimuth,
-            mueller, brdf, energy, counts,
+            end, record, k, bounces, state[k, KX], state[k, KY], state[k, KZ],
+            state[k, COS_PHI], state[k, SIN_PHI], optics, tally,
         )  # fmt: skip
     return kept

@@ -32,16 +32,17 @@ class GaussianSurface:
     Raises
     ------
     ValueError
-        If both or neither of slope_rms and height_rms are given, a value is not positive, or
-        the grid cannot hold the correlation length.
+        If both or neither of slope_rms and height_rms are given, a value is not positive,
+        or the grid cannot hold the correlation length.
 
     Notes
     -----
     White noise is filtered with the square root of the discrete spectrum of the periodic
     autocorrelation, so amplitudes as well as phases are random and heights are jointly
     Gaussian on the grid. Equation (19), slope = √2 height / length, holds for the continuous
-    surface; facets average over one cell, which lowers the slope by 1 - 1/(4 m²) for m cells
-    a correlation length. The forward differences of the grid are what `slope_rms` fixes.
+    surface; facets average over one cell, which lowers the slope by 1 - 1/(4 m²) for m
+    cells a correlation length. The forward differences of the grid are what `slope_rms`
+    fixes.
 
     Examples
     --------
@@ -62,7 +63,8 @@ class GaussianSurface:
         if (self.slope_rms is None) == (self.height_rms is None):
             msg = (
                 "slope_rms and height_rms: give exactly one, got "
-                f"{self.slope_rms} and {self.height_rms}. The other follows from corr_length."
+                f"{self.slope_rms} and {self.height_rms}. "
+                "The other follows from corr_length."
             )
             raise ValueError(msg)
         for name in ("spacing", "corr_length", "slope_rms", "height_rms"):

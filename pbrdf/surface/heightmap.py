@@ -93,7 +93,9 @@ class HeightMap:
     @classmethod
     def flat(cls, size: tuple[float, float] = (1.0, 1.0)) -> "HeightMap":
         """Periodic plane z = 0 with periods `size` = (lx, ly). [um]"""
-        lengths = require("size", size, lambda v: v > 0, "be positive [um]", "Give (lx, ly).")
+        lengths = require(
+            "size", size, lambda v: v > 0, "be positive [um]", "Give (lx, ly)."
+        )
         lx, ly = np.broadcast_to(lengths, (2,))
         return cls(np.zeros((2, 2)), (lx / 2, ly / 2), periodic=True)
 

@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from pbrdf.kernels import wavefront
-from pbrdf.kernels.binning import bin_edges
+from pbrdf.kernels import shading, wavefront
+from pbrdf.kernels.entry import Source
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.mesh import Mesh, build_mesh
-from pbrdf.tracer.plan import Plan, Tally
 
 # Rays traced together; their state stays in the cache of one core
 CHUNK = 16_384
@@ -43,40 +42,28 @@ class EmbreeField:
         return faces
 
 
-def trace_direction(
-    target: EmbreeField, plan: Plan, index: int, shifts: np.ndarray, tally: Tally
+def trace_waves(
+    target: EmbreeField,
+    source: Source,
+    max_bounces: int,
+    optics: shading.Optics,
+    tally: shading.Tally,
 ) -> None:
-    """Trace one incident direction and add to the tally."""
-    field, mesh = target.field, target.mesh
-    theta = plan.theta_i[index]
-    launch = field.entry_rectangle(theta, plan.phi_i)
-    lines = field.entry_lines(launch, plan.n_rays)
-    size = min(CHUNK, plan.n_rays)
+    """Trace one incident direction in chunks of rays, bounce by bounce, and add to the tally."""
+    terrain, frame = target.field.terrain, target.mesh.frame
+    size = min(CHUNK, source.n_rays)
     state = np.empty((size, wavefront.N_STATE))
     cell = np.empty((size, wavefront.N_CELL), dtype=np.int64)
-    cos_beta = np.empty((plan.max_bounces, size))
-    turn = np.empty((plan.max_bounces + 1, size, 2))
-    mueller = np.zeros((4, 4))
-    zenith, azimuth = bin_edges(plan.n_theta, plan.n_dphi)
-    for first in range(0, plan.n_rays, size):
-        active = np.empty(min(size, plan.n_rays - first), dtype=np.int64)
-        wavefront.enter_rays(
-            first, plan.n_rays, launch, lines, shifts, *field.pitch,
-            np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
-            field.z_top, *field.cells, state, cell, active,
-        )  # fmt: skip
+    record = np.empty((max_bounces + 1, size, shading.N_RECORD))
+    for first in range(0, source.n_rays, size):
+        active = np.empty(min(size, source.n_rays - first), dtype=np.int64)
+        wavefront.enter_rays(terrain, source, first, state, cell, active)
         while active.size:
             origins = np.empty((active.size, 3), dtype=np.float32)
             directions = np.empty((active.size, 3), dtype=np.float32)
-            wavefront.emit_rays(
-                field.heights, field.periodic, *field.pitch, *mesh.center, mesh.unit,
-                mesh.offset, state, cell, active, origins, directions,
-            )  # fmt: skip
+            wavefront.emit_rays(terrain, frame, state, cell, active, origins, directions)
+            faces = target.first_faces(origins, directions)
             kept = wavefront.advance_rays(
-                field.heights, field.periodic, *field.pitch, field.z_top, field.z_bottom,
-                *mesh.guard, target.first_faces(origins, directions), plan.max_bounces,
-                state, cell, active, cos_beta, turn,
-                plan.n, plan.kappa, plan.n_stokes, zenith, azimuth, mueller,
-                tally.flux[index], tally.energy[index], tally.counts[index],
-            )  # fmt: skip
+                terrain, frame, faces, state, cell, active, record, optics, tally
+            )
             active = active[:kept]

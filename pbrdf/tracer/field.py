@@ -4,61 +4,69 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbrdf.kernels.heightfield import block_maxima
+from pbrdf.kernels.heightfield import Terrain, block_maxima
 from pbrdf.surface.heightmap import HeightMap
 
-# A finite map keeps a rim this many height ranges wide free of entry points, at most an eighth
-# of each side, so that light leaving the interior rises above the map before its edge
+# A finite map keeps a rim this many height ranges wide free of entry points, at most an
+# eighth of each side, so that light leaving the interior rises above the map before its
+# edge
 GUARD_HEIGHTS = 2.0
 GUARD_SHARE = 0.125
 # Least share of the area of a finite map that must be left for entry points
 LEAST_INTERIOR = 0.1
+NO_LABELS = np.empty((0, 0), dtype=np.uint8)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Field:
-    """Arrays of one surface as the kernels take them, built once for all directions.
+    """One surface as the kernels take it, built once for all directions.
 
     Attributes
     ----------
-    heights : ndarray, shape (nx, ny)
-        Node heights. [um]
-    maxima, levels : ndarray
-        Pyramid of block maxima, see `pbrdf.kernels.heightfield.block_maxima`.
-    z_top, z_bottom : float
-        Highest and lowest node. [um]
-    pitch : (float, float)
-        Grid steps. [um]
-    periodic : bool
-        Whether the surface repeats.
+    terrain : Terrain
+        Heights, pyramid of block maxima, grid steps and labels.
+    z_bottom : float
+        Lowest node. [um]
     """
 
-    heights: np.ndarray
-    maxima: np.ndarray
-    levels: np.ndarray
-    z_top: float
+    terrain: Terrain
     z_bottom: float
-    pitch: tuple[float, float]
-    periodic: bool
 
     @classmethod
     def of(cls, surface: HeightMap) -> "Field":
         """Prepare a height map without missing heights."""
         maxima, levels = block_maxima(surface.heights, surface.periodic)
-        return cls(
+        terrain = Terrain(
             heights=surface.heights,
             maxima=maxima,
             levels=levels,
             z_top=float(surface.heights.max()),
-            z_bottom=float(surface.heights.min()),
-            pitch=surface.spacing,
             periodic=surface.periodic,
+            pitch_x=surface.spacing[0],
+            pitch_y=surface.spacing[1],
+            labels=NO_LABELS if surface.labels is None else surface.labels,
         )
+        return cls(terrain=terrain, z_bottom=float(surface.heights.min()))
+
+    @property
+    def periodic(self) -> bool:
+        """Whether the surface repeats."""
+        return bool(self.terrain.periodic)
+
+    @property
+    def pitch(self) -> tuple[float, float]:
+        """Grid steps. [um]"""
+        return self.terrain.pitch_x, self.terrain.pitch_y
+
+    @property
+    def height_range(self) -> float:
+        """Height of the highest node above the lowest. [um]"""
+        return float(self.terrain.z_top - self.z_bottom)
 
     @property
     def cells(self) -> tuple[int, int]:
         """Number of grid cells along x and y."""
-        nx, ny = self.heights.shape
+        nx, ny = self.terrain.heights.shape
         return (nx, ny) if self.periodic else (nx - 1, ny - 1)
 
     def entry_lines(self, launch: np.ndarray, n_rays: int) -> int:
@@ -79,10 +87,10 @@ class Field:
         ValueError
             If less than a tenth of a finite map is left.
         """
-        nx, ny = self.heights.shape
+        nx, ny = self.terrain.heights.shape
         if self.periodic:
             return np.array([0.0, 0.0, nx, ny])
-        height_range = self.z_top - self.z_bottom
+        height_range = self.height_range
         sides = np.array([nx - 1.0, ny - 1.0])
         pitch = np.asarray(self.pitch)
         drift = -np.tan(theta_i) * height_range / pitch
@@ -101,7 +109,8 @@ class Field:
             msg = (
                 f"theta_i must suit the size of the finite map, got {theta_i:g} rad: light "
                 f"crosses {reach:.3g} um of it on its way down a height range of "
-                f"{height_range:.3g} um. Use a larger map, a steeper source or periodic=True."
+                f"{height_range:.3g} um. Use a larger map, a steeper source "
+                "or periodic=True."
             )
             raise ValueError(msg)
         return np.concatenate([low, lengths])

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pbrdf.kernels.wavefront import MeshFrame
 from pbrdf.tracer.field import Field
 
 # The mesh of a periodic surface goes on this many height ranges beyond the period
@@ -19,34 +20,25 @@ class Mesh:
     Attributes
     ----------
     vertices : ndarray, shape (nodes, 3), float32
-        In units of `unit` about `center`.
+        In units of one grid step about the centre.
     faces : ndarray, shape (2 cells, 3), int32
         Node numbers.
-    guard : (int, int)
-        Cells added on each side of a periodic surface.
-    center : (float, float, float)
-        Centre in cells, cells and micrometres.
-    unit : float
-        Length of one unit. [um]
-    offset : float
-        Lift of a ray off its facet, in units. [1]
+    frame : MeshFrame
+        Centre, unit, guard band and lift of the rays.
     """
 
     vertices: np.ndarray
     faces: np.ndarray
-    guard: tuple[int, int]
-    center: tuple[float, float, float]
-    unit: float
-    offset: float
+    frame: MeshFrame
 
 
 def build_mesh(field: Field) -> Mesh:
     """Triangulate a field; a periodic one with a guard band of wrapped cells."""
     unit = float(np.sqrt(field.pitch[0] * field.pitch[1]))
-    nodes = field.heights.shape
+    nodes = field.terrain.heights.shape
     guard = (0, 0)
     if field.periodic:
-        reach = GUARD_HEIGHTS * (field.z_top - field.z_bottom)
+        reach = GUARD_HEIGHTS * field.height_range
         guard = (
             int(np.clip(np.ceil(reach / field.pitch[0]), 2, max(2, nodes[0] // 2))),
             int(np.clip(np.ceil(reach / field.pitch[1]), 2, max(2, nodes[1] // 2))),
@@ -54,9 +46,9 @@ def build_mesh(field: Field) -> Mesh:
     extra = 1 if field.periodic else 0
     columns = np.arange(-guard[0], nodes[0] + guard[0] + extra)
     rows = np.arange(-guard[1], nodes[1] + guard[1] + extra)
-    heights = field.heights[np.ix_(columns % nodes[0], rows % nodes[1])]
+    heights = field.terrain.heights[np.ix_(columns % nodes[0], rows % nodes[1])]
 
-    center = (nodes[0] / 2, nodes[1] / 2, 0.5 * (field.z_top + field.z_bottom))
+    center = (nodes[0] / 2, nodes[1] / 2, 0.5 * (field.terrain.z_top + field.z_bottom))
     vertices = np.empty((*heights.shape, 3), dtype=np.float32)
     vertices[..., 0] = ((columns - center[0]) * field.pitch[0] / unit)[:, None]
     vertices[..., 1] = ((rows - center[1]) * field.pitch[1] / unit)[None, :]
@@ -72,8 +64,8 @@ def build_mesh(field: Field) -> Mesh:
     return Mesh(
         vertices=vertices.reshape(-1, 3),
         faces=np.stack([low, high], axis=2).reshape(-1, 3),
-        guard=guard,
-        center=center,
-        unit=unit,
-        offset=max(1e-4, 32.0 * float(np.spacing(np.float32(largest)))),
-    )
+        frame=MeshFrame(
+            *center, unit, max(1e-4, 32.0 * float(np.spacing(np.float32(largest)))),
+            *guard, field.z_bottom,
+        ),
+    )  # fmt: skip

@@ -21,8 +21,10 @@ class Plan:
         Azimuth of the source; None spreads it evenly over the circle. [rad]
     n_rays, max_bounces : int
         Rays an incident direction and sample, and where their paths are cut.
-    n, kappa : ndarray, shape (wavelengths,)
+    n, kappa : ndarray, shape (wavelengths, materials)
         Index of the substrate. [1]
+    base : ndarray, shape (wavelengths, materials) or (wavelengths, 0)
+        Strength of the diffuse base under the interface; of no width where there is none.
     n_stokes : int
         4 for (I, Q, U, V), 3 without V, 1 for I alone.
     n_theta, n_dphi : int
@@ -35,6 +37,7 @@ class Plan:
     max_bounces: int
     n: np.ndarray
     kappa: np.ndarray
+    base: np.ndarray
     n_stokes: int
     n_theta: int
     n_dphi: int
@@ -52,8 +55,8 @@ class Plan:
 class Tally:
     """Flux, energy and counts of one sample, per incident direction.
 
-    `flux` has the shape of the plan and is not normalised; `energy` (angles, wavelengths, 3)
-    is what was absorbed, truncated and leaked; `counts` (angles, 6) as in
+    `flux` has the shape of the plan and is not normalised; `energy` (angles, wavelengths, 4)
+    is what was absorbed, truncated, leaked and lost sideways; `counts` (angles, 6) as in
     `pbrdf.kernels.shading`.
     """
 
@@ -61,14 +64,13 @@ class Tally:
     energy: np.ndarray
     counts: np.ndarray
 
-
     @classmethod
     def empty(cls, plan: Plan) -> "Tally":
         """Nothing traced yet."""
         angles, wavelengths = plan.tally_shape[:2]
         return cls(
             flux=np.zeros(plan.tally_shape),
-            energy=np.zeros((angles, wavelengths, 3)),
+            energy=np.zeros((angles, wavelengths, shading.N_ENERGIES)),
             counts=np.zeros((angles, shading.N_COUNTS), dtype=np.int64),
         )
 
@@ -93,8 +95,10 @@ class Moments:
         self.samples += 1
         self.counts += tally.counts
         angles, wavelengths, orders = tally.flux.shape[:3]
-        # Rays that left a finite map sideways count in neither part of the fraction
-        counted = self.plan.n_rays - tally.counts[:, shading.N_SIDE]
+        # Rays that left a finite map sideways count in neither part of the fraction; where
+        # a base splits rays, only a part of each may leave so and has its own account
+        aside = tally.counts[:, shading.N_SIDE] if self.plan.base.shape[1] == 0 else 0
+        counted = np.broadcast_to(self.plan.n_rays - aside, (angles,))
         scale = 1.0 / np.maximum(counted, 1)
         for a in range(angles):
             add_sample(
@@ -117,7 +121,7 @@ class Moments:
         return self._mean, self._stderr(self._scatter)
 
     def flux_total(self) -> tuple[np.ndarray, np.ndarray]:
-        """The same for all bounces together."""
+        """Return the same for all bounces together."""
         return self._mean_total, self._stderr(self._scatter_total)
 
     def albedo(self) -> tuple[np.ndarray, np.ndarray]:
@@ -128,7 +132,7 @@ class Moments:
         return values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(self.samples)
 
     def energy(self) -> np.ndarray:
-        """Mean energy absorbed, truncated and leaked (angles, wavelengths, 3)."""
+        """Mean energy by fate (angles, wavelengths, 4)."""
         return np.mean(self._energy, axis=0)
 
     def rel_error(self) -> float:

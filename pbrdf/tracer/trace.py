@@ -2,8 +2,11 @@
 
 import numpy as np
 
-from pbrdf.kernels import transport
-from pbrdf.tracer.embree import EmbreeField, trace_direction
+from pbrdf.kernels import shading
+from pbrdf.kernels.binning import bin_edges
+from pbrdf.kernels.entry import Source
+from pbrdf.kernels.transport import sweep_batch, trace_batch
+from pbrdf.tracer.embree import EmbreeField, trace_waves
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.plan import Plan, Tally
 
@@ -17,28 +20,28 @@ def trace_sample(
     the stream, so that neither the number of threads nor the intersector changes the rays.
     """
     tally = Tally.empty(plan)
-    shifts = np.random.default_rng(seed).random((len(plan.theta_i), 3))
-    for index in range(len(plan.theta_i)):
+    edges = bin_edges(plan.n_theta, plan.n_dphi)
+    optics = shading.Optics(plan.n, plan.kappa, plan.base, plan.n_stokes)
+    rng = np.random.default_rng(seed)
+    shifts = rng.random((len(plan.theta_i), 3))
+    streams = rng.integers(2**63, size=len(plan.theta_i), dtype=np.uint64)
+    for index, theta in enumerate(plan.theta_i):
+        field = target.field if isinstance(target, EmbreeField) else target
+        launch = field.entry_rectangle(theta, plan.phi_i)
+        source = Source(
+            np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
+            launch, field.entry_lines(launch, plan.n_rays), plan.n_rays,
+            shifts[index], streams[index],
+        )  # fmt: skip
+        bins = shading.Tally(
+            *edges, tally.flux[index], tally.energy[index], tally.counts[index],
+            np.zeros((4, 4)),
+        )  # fmt: skip
         if isinstance(target, EmbreeField):
-            trace_direction(target, plan, index, shifts[index], tally)
+            trace_waves(target, source, plan.max_bounces, optics, bins)
+        elif field.periodic:
+            # One pass along each line of entry points finds all first facets
+            sweep_batch(field.terrain, source, plan.max_bounces, optics, bins)
         else:
-            walk_direction(target, plan, index, shifts[index], tally)
+            trace_batch(field.terrain, source, plan.max_bounces, optics, bins)
     return tally
-
-
-def walk_direction(
-    field: Field, plan: Plan, index: int, shifts: np.ndarray, tally: Tally
-) -> None:
-    """Trace one incident direction by the walk over the height field, and add to the tally."""
-    theta = plan.theta_i[index]
-    launch = field.entry_rectangle(theta, plan.phi_i)
-    # On a periodic field one pass along each line of entry points finds all first facets
-    trace = transport.sweep_batch if field.periodic else transport.trace_batch
-    trace(
-        field.heights, field.maxima, field.levels, field.z_top, field.periodic, *field.pitch,
-        launch, field.entry_lines(launch, plan.n_rays),
-        np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
-        plan.n_rays, shifts, plan.max_bounces,
-        plan.n, plan.kappa, plan.n_stokes,
-        tally.flux[index], tally.energy[index], tally.counts[index],
-    )  # fmt: skip
