@@ -17,46 +17,48 @@ class Variable(NamedTuple):
     dims: tuple[str, ...]
 
 
+_LIGHT = ("theta_i", "wavelength")
+_BOUNCES = ("bounces", *_LIGHT)
 _BINS = ("theta_s", "dphi")
 _MUELLER = (*_BINS, "stokes_out", "stokes_in")
 
 RESULT_VARIABLES: dict[str, Variable] = {
     "brdf": Variable(
-        "sr-1", "Mueller BRDF by number of bounces", ("bounces", "theta_i", "wavelength", *_MUELLER)
+        "sr-1", "Mueller BRDF by number of bounces", (*_BOUNCES, *_MUELLER)
     ),
     "brdf_stderr": Variable(
-        "sr-1", "standard error of brdf", ("bounces", "theta_i", "wavelength", *_MUELLER)
+        "sr-1", "standard error of brdf", (*_BOUNCES, *_MUELLER)
     ),
     "brdf_total": Variable(
-        "sr-1", "Mueller BRDF of all bounces", ("theta_i", "wavelength", *_MUELLER)
+        "sr-1", "Mueller BRDF of all bounces", (*_LIGHT, *_MUELLER)
     ),
     "brdf_total_stderr": Variable(
-        "sr-1", "standard error of brdf_total", ("theta_i", "wavelength", *_MUELLER)
+        "sr-1", "standard error of brdf_total", (*_LIGHT, *_MUELLER)
     ),
     "albedo": Variable(
         "1", "directional-hemispherical reflectance by number of bounces",
-        ("bounces", "theta_i", "wavelength"),
+        _BOUNCES,
     ),
     "albedo_stderr": Variable(
-        "1", "standard error of albedo", ("bounces", "theta_i", "wavelength")
+        "1", "standard error of albedo", _BOUNCES
     ),
     "projected_solid_angle": Variable("sr", "integral of cos(theta_s) over the bin", _BINS),
-    "absorbed": Variable("1", "share of the light absorbed", ("theta_i", "wavelength")),
-    "transmitted": Variable("1", "share of the light transmitted", ("theta_i", "wavelength")),
+    "absorbed": Variable("1", "share of the light absorbed", _LIGHT),
+    "transmitted": Variable("1", "share of the light transmitted", _LIGHT),
     "truncated": Variable(
-        "1", "share of the light still travelling at the bounce limit", ("theta_i", "wavelength")
+        "1", "share of the light still travelling at the bounce limit", _LIGHT
     ),
-    "leaked": Variable("1", "share of the light lost by a fault", ("theta_i", "wavelength")),
+    "leaked": Variable("1", "share of the light lost by a fault", _LIGHT),
     "left_sideways": Variable(
         "1", "share of the light that a diffuse base sent off a finite map",
-        ("theta_i", "wavelength"),
+        _LIGHT,
     ),
     "side_exits": Variable(
         "1", "share of the rays that left a finite map sideways, not counted", ("theta_i",)
     ),
     "theta_i": Variable("rad", "zenith angle of the source", ("theta_i",)),
-    "theta_s": Variable("rad", "zenith angle of the detector, bin centre", ("theta_s",)),
-    "dphi": Variable("rad", "azimuth of the detector from the source, bin centre", ("dphi",)),
+    "theta_s": Variable("rad", "zenith of the detector, bin centre", ("theta_s",)),
+    "dphi": Variable("rad", "azimuth from source to detector, bin centre", ("dphi",)),
     "wavelength": Variable("um", "vacuum wavelength", ("wavelength",)),
     "bounces": Variable("1", "number of bounces", ("bounces",)),
     "stokes_out": Variable("1", "Stokes element of the scattered light", ("stokes_out",)),
@@ -84,8 +86,8 @@ def meridian_frame(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Frame (e_s, e_p) of a beam along the unit vector `prop`, shapes (..., 3).
 
-    e_s = z x k / |z x k| and e_p = k x e_s. For k along the z axis `phi` is the azimuth of the
-    propagation vector whose limit is taken.
+    e_s = z x k / |z x k| and e_p = k x e_s. For k along the z axis `phi` is the azimuth of
+    the propagation vector whose limit is taken.
 
     Examples
     --------
@@ -102,7 +104,7 @@ def meridian_frame(
 
 
 def detector_bins(n_theta: int, n_dphi: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Bin centres theta_s (n_theta,), dphi (n_dphi,) [rad] and ∫cosθ dΩ (n_theta, n_dphi) [sr].
+    """Bin centres theta_s and dphi [rad] and ∫cosθ dΩ (n_theta, n_dphi) of the bins [sr].
 
     Zenith bins are equal in angle over [0, π/2]; azimuth bins are equal over the circle and
     centred on 0 and π.

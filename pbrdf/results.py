@@ -1,4 +1,4 @@
-"""Result datasets: labelled axes, units from the one table, the whole scene as attributes."""
+"""Result datasets: labelled axes, units from one table, the scene as attributes."""
 
 from typing import Any
 
@@ -77,9 +77,9 @@ def to_dataset(
             dims = tuple(d for d in dims if d != "wavelength")
         data[name] = (dims, array)
     dataset = xr.Dataset(data, coords)
-    for name in dataset.variables:
-        entry = RESULT_VARIABLES[str(name)]
-        dataset[name].attrs = {"units": entry.units, "long_name": entry.long_name}
+    for variable in dataset.variables:
+        entry = RESULT_VARIABLES[str(variable)]
+        dataset[variable].attrs = {"units": entry.units, "long_name": entry.long_name}
 
     dataset.attrs = attrs | {
         "version": pbrdf.__version__,

@@ -78,12 +78,12 @@ class Scene:
                 "Only clean opaque surfaces are simulated."
             )
             raise ValueError(msg)
-        single = isinstance(substrate, str | Material)
-        listed = [substrate] if single else list(substrate)
+        several = not isinstance(substrate, str | Material)
+        listed: Any = substrate if several else (substrate,)
         materials = tuple(library.get(m) if isinstance(m, str) else m for m in listed)
         _check_labels(surface, materials)
         object.__setattr__(self, "surface", surface)
-        object.__setattr__(self, "substrate", materials[0] if single else materials)
+        object.__setattr__(self, "substrate", materials if several else materials[0])
         object.__setattr__(self, "contaminants", tuple(contaminants))
 
     @property
@@ -168,7 +168,7 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def read_toml(source: Path) -> dict[str, Any]:
-    """Parsed TOML file, or a DataFileError that says what is wrong with it."""
+    """Parse a TOML file, or raise a DataFileError that says what is wrong with it."""
     try:
         return tomllib.loads(source.read_text(encoding="utf-8"))
     except OSError as error:

@@ -31,7 +31,7 @@ FEW_REALIZATIONS = 8
 MAX_SAMPLES = 4096
 
 
-def simulate(
+def simulate(  # noqa: PLR0913  (the public signature)
     scene: Scene,
     theta_i: npt.ArrayLike,
     *,
@@ -167,9 +167,9 @@ def simulate(
         moments.add(tally)
         if progress is not None:
             progress(moments.samples, samples if target is None else limit)
-        if target is not None and moments.samples >= max(least, 2):
-            if moments.rel_error() <= target:
-                break
+        enough = moments.samples >= max(least, 2)
+        if target is not None and enough and moments.rel_error() <= target:
+            break
     return to_dataset(
         moments,
         scene,
@@ -336,7 +336,8 @@ def _constants(
         if albedo > 0.0 and opaque:
             msg = (
                 f"kappa must be 0 over a diffuse base [1], got {kappa[:, column].max():g} "
-                f"and diffuse_albedo {albedo:g}. Light does not reach a base under an absorber."
+                f"and diffuse_albedo {albedo:g}. "
+                "Light does not reach a base under an absorber."
             )
             raise ValueError(msg)
         base[:, column] = [
@@ -364,8 +365,8 @@ def _warnings(
     if isinstance(surface, GaussianSurface):
         if drawn == 1:
             notes.append(
-                "One realisation of a random surface: standard errors hold for this surface "
-                "only. Ask for 16 realizations or more."
+                "One realisation of a random surface: standard errors hold for this "
+                "surface only. Ask for 16 realizations or more."
             )
         elif drawn < FEW_REALIZATIONS:
             notes.append(

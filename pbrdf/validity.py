@@ -22,8 +22,8 @@ def geometric_optics_warnings(
         if coherent > 0.01:
             found.append(
                 f"At theta_i {np.rad2deg(theta):.4g} deg and {wavelength:g} um, "
-                f"{100 * coherent:.2g} % of the light stays in a coherent specular beam that "
-                "geometric optics does not know."
+                f"{100 * coherent:.2g} % of the light stays in a coherent specular beam "
+                "that geometric optics does not know."
             )
     # Rms curvature of the autocorrelation exp(-r²/l²) is 2 √3 h / l²
     radius = length**2 * (1 + 2 * (height / length) ** 2) ** 1.5 / (2 * np.sqrt(3) * height)

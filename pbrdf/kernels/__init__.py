@@ -34,11 +34,12 @@ def jit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """Compile a kernel without the interpreter lock and cache it under `cache_folder`."""
     if function is None:
         return lambda kernel: jit(kernel, **options)
-    options = {"nogil": True, "cache": True, "error_model": "numpy"} | options
+    settings: Any = {"nogil": True, "cache": True, "error_model": "numpy"} | options
     # Numba reads its cache folder when a function is decorated, and only there
-    previous = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _FOLDER
+    config: Any = numba.config
+    previous = config.CACHE_DIR
+    config.CACHE_DIR = _FOLDER
     try:
-        return numba.njit(**options)(function)
+        return numba.njit(**settings)(function)
     finally:
-        numba.config.CACHE_DIR = previous
+        config.CACHE_DIR = previous

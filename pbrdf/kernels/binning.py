@@ -17,9 +17,7 @@ TWO_PI = 2.0 * math.pi
 
 @jit
 def bin_edges(n_theta, n_dphi):
-    """Cosines of the zenith edges (n_theta + 1), falling, and unit vectors of the lower azimuth
-    edges (n_dphi, 2).
-    """
+    """Cosines of the zenith edges, and unit vectors along the lower azimuth edges."""
     zenith = np.empty(n_theta + 1)
     for k in range(n_theta + 1):
         zenith[k] = math.cos(HALF_PI * k / n_theta)
@@ -42,7 +40,7 @@ def rough_arccos(x):
 
 @jit(inline="always")
 def rough_azimuth(x, y):
-    """Angle of (x, y) in [0, 2 pi) to 4e-3 (Abramowitz and Stegun, eq. 4.4.47, shortened)."""
+    """Angle of (x, y) in [0, 2 pi) to 1e-3, after Abramowitz and Stegun, eq. 4.4.49."""
     a = abs(x)
     b = abs(y)
     large = max(a, b)
@@ -59,7 +57,7 @@ def rough_azimuth(x, y):
 
 @jit(inline="always")
 def bin_of_direction(x, y, z, cos_phi_i, sin_phi_i, zenith, azimuth):
-    """Bin (theta_s, dphi) of a unit direction above the surface, for edges of `bin_edges`."""
+    """Bin (theta_s, dphi) of a unit direction above the surface, by `bin_edges`."""
     n_theta = zenith.shape[0] - 1
     i_theta = min(int(rough_arccos(z) * (n_theta / HALF_PI)), n_theta - 1)
     while z > zenith[i_theta]:

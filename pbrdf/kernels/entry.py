@@ -61,17 +61,18 @@ def entry_line(line, source, pitch_x, pitch_y):
         start_y = launch[1] if down_y > 0.0 else launch[1] + launch[3]
         length = launch[3]
     return (
-        start_x, start_y, down_x * unit, down_y * unit, length, unit, offset, cos_phi, sin_phi,
+        start_x, start_y, down_x * unit, down_y * unit, length, unit, offset,
+        cos_phi, sin_phi,
     )  # fmt: skip
 
 
 @jit(inline="always")
 def first_ray(line, source):
-    """Number of the first ray of a line; the rays are dealt evenly to the lines."""
+    """First ray of a line; the rays are dealt evenly to the lines."""
     return -((-line * source.n_rays) // source.n_lines)
 
 
 @jit(inline="always")
 def wrap_into(x, low, length):
-    """The place x brought into [low, low + length) by whole lengths."""
+    """Place x, brought into [low, low + length) by whole lengths."""
     return low + length * fraction((x - low) / length)

@@ -1,9 +1,9 @@
 """Frames of Stokes vectors along a path, from dot products and never from an arccos.
 
-A beam along the unit vector k has the frame (e_s, e_p = k x e_s). Turning the frame about k to
-a new s axis w needs the cosine and sine of twice the angle only; they follow from the
-projections of w on the old axes without its length: (a² - b²) / (a² + b²), 2 a b / (a² +
-b²).
+A beam along the unit vector k has the frame (e_s, e_p = k x e_s). Turning the frame
+about k to a new s axis w needs the cosine and sine of twice the angle only; they
+follow from the projections a, b of w on the old axes without its length: they are
+(a² - b²)/(a² + b²) and 2 a b/(a² + b²).
 """
 
 from pbrdf.kernels import jit
@@ -15,7 +15,7 @@ PARALLEL = 1e-28
 
 @jit(inline="always")
 def turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, w_x, w_y, w_z):
-    """Cosine and sine of twice the angle from the axis s to the axis w of a beam along k."""
+    """Cosine and sine of twice the angle from axis s to axis w of a beam along k."""
     # e_p = k x e_s
     p_x = k_y * s_z - k_z * s_y
     p_y = k_z * s_x - k_x * s_z

@@ -57,7 +57,7 @@ def block_maxima(heights: np.ndarray, periodic: bool) -> tuple[np.ndarray, np.nd
 
 @jit(inline="always")
 def cell_counts(terrain):
-    """Number of cells along x and y."""
+    """Count the cells along x and y."""
     nx, ny = terrain.heights.shape
     if terrain.periodic:
         return nx, ny
@@ -117,9 +117,11 @@ def fall(heights, periodic, i, j, u, v, z, speed_z):
     return HIT, i, j, facet, u, v, plane_height(z00, z10, z01, z11, facet, u, v)
 
 
+# One loop on purpose: every step decides between blocks, cells and facets, and a call in it
+# would cost as much as the step
 @jit(inline="always")
 def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, max_steps):
-    """Follow a ray from the place (u, v) of cell (i, j) at height z to the next facet it meets.
+    """Follow a ray from (u, v) of cell (i, j) at height z to the next facet it meets.
 
     With facet >= 0 the ray starts on that facet and leaves it at `leave_rate` > 0 per unit
     of t; with -1 it starts in free space. Returns (fate, i, j, facet, u, v, z).

@@ -33,7 +33,7 @@ def facet_density(way, facet, rough):
     return density / (4.0 * way.cos_i * way.cos_s)
 
 
-@jit
+@jit(forceinline=True)
 def brdf_rows(way, facet, strength, n, kappa, diffuse, radiance):
     """Rows of strength times F', plus the terms (22) and (23). [1/sr]"""
     a, b, c, d = facet_elements(facet.cos_beta, facet.sin2_beta, n, kappa)
@@ -49,7 +49,7 @@ def brdf_rows(way, facet, strength, n, kappa, diffuse, radiance):
     )
 
 
-@jit
+@jit(forceinline=True)
 def microfacet_brdf(way, n, kappa, surface, radiance):
     """Rows of the Mueller BRDF of equation (24); radiance from `base_radiance`. [1/sr]"""
     facet = mirror_facet(way)

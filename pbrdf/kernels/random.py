@@ -16,7 +16,7 @@ UNIT = 2.0**-53
 
 @jit(inline="always")
 def mix(x):
-    """Finaliser of SplitMix64 (Steele, Lea and Flood 2014): every bit depends on every bit."""
+    """Finaliser of SplitMix64 (Steele, Lea and Flood 2014): all bits depend on all bits."""
     x = (x ^ (x >> np.uint64(30))) * MIX_A
     x = (x ^ (x >> np.uint64(27))) * MIX_B
     return x ^ (x >> np.uint64(31))

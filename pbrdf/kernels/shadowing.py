@@ -81,7 +81,7 @@ def combined_overhangs(rule, way, lambda_i, lambda_s):
     return 1.0 / ((1.0 + lambda_i) * (1.0 + lambda_s))
 
 
-@jit
+@jit(forceinline=True)
 def smith_factor(rule, way, rough):
     """Statistical factors built on Smith's Lambda of the two directions."""
     sin_dphi = 2.0 * way.sin_h * way.cos_h
@@ -101,7 +101,7 @@ def smith_factor(rule, way, rough):
     return both * up_i * facing_up(way.cos_s, way.sin_s, slope_s)
 
 
-@jit
+@jit(forceinline=True)
 def shadowing_factor(shadow, way, facet, rough):
     """Fraction of the facets that both the source and the detector see."""
     if shadow.rule == NONE:

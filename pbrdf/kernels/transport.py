@@ -179,14 +179,16 @@ def trace_ray(
                 waiting[n_waiting, W_Z] = z
                 waiting[n_waiting, W_BOUNCE] = bounces
                 (
-                    waiting[n_waiting, W_KX], waiting[n_waiting, W_KY], waiting[n_waiting, W_KZ],
-                    waiting[n_waiting, W_SX], waiting[n_waiting, W_SY], waiting[n_waiting, W_SZ],
+                    waiting[n_waiting, W_KX], waiting[n_waiting, W_KY],
+                    waiting[n_waiting, W_KZ], waiting[n_waiting, W_SX],
+                    waiting[n_waiting, W_SY], waiting[n_waiting, W_SZ],
                     waiting[n_waiting, W_RATE], waiting[n_waiting, W_COS],
                 ) = scatter(slope_x, slope_y, draw_a, draw_b)  # fmt: skip
                 n_waiting += 1
             (
                 k_x, k_y, k_z, s_x, s_y, s_z, leave_rate,
-                record[bounces, 0, COS_IN], record[bounces, 0, TURN_C], record[bounces, 0, TURN_S],
+                record[bounces, 0, COS_IN],
+                record[bounces, 0, TURN_C], record[bounces, 0, TURN_S],
             ) = bounce(k_x, k_y, k_z, s_x, s_y, s_z, slope_x, slope_y)  # fmt: skip
             record[bounces, 0, COS_OUT] = SPECULAR
             record[bounces, 0, LABEL] = labels[i, j] if labels.size > 0 else 0
@@ -226,7 +228,8 @@ def trace_ray(
         fate, i, j, facet, u, v, z = walk(
             terrain, int(waiting[n_waiting, W_I]), int(waiting[n_waiting, W_J]),
             int(waiting[n_waiting, W_FACET]), waiting[n_waiting, W_U],
-            waiting[n_waiting, W_V], waiting[n_waiting, W_Z], k_x / pitch_x, k_y / pitch_y, k_z,
+            waiting[n_waiting, W_V], waiting[n_waiting, W_Z],
+            k_x / pitch_x, k_y / pitch_y, k_z,
             waiting[n_waiting, W_RATE], MAX_STEPS,
         )  # fmt: skip
 

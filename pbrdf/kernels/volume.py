@@ -24,11 +24,12 @@ PAPER, BASE, POLARISED_BASE = range(3)
 BOUNDED = 1
 
 # diffuse_albedo, grazing_albedo with its form, volume_albedo with its form and the
-# depolarisation of the light between entrance and exit; has_volume: whether to look at it
+# depolarisation of the light between entrance and exit; has_more: whether there is
+# more than the first
 Diffuse = namedtuple(
     "Diffuse",
     "diffuse_albedo grazing_albedo grazing_form "
-    "volume_albedo volume_form depolarisation has_volume",
+    "volume_albedo volume_form depolarisation has_more",
 )
 
 _nodes, _weights = np.polynomial.legendre.leggauss(16)
@@ -59,7 +60,7 @@ def base_radiance(n, kappa, diffuse):
     light over n^2 times the solid angle and gets back what the interface reflects inside.
     """
     albedo = diffuse.volume_albedo
-    if not diffuse.has_volume:
+    if not diffuse.has_more:
         return 0.0
     if diffuse.volume_form == PAPER:
         return albedo / pi
@@ -73,8 +74,6 @@ def volume_elements(way, n, kappa, diffuse, radiance):
     The mean plane refracts in the meridian planes, so no frame is turned: what comes out is
     polarised along e_p by its way out. Only element (0, 0) in the unpolarised forms.
     """
-    if not diffuse.has_volume:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
     a_i, b_i, c_i = transmission_parts(way.cos_i, n, kappa)
     a_s, b_s, c_s = transmission_parts(way.cos_s, n, kappa)
     if diffuse.volume_form != POLARISED_BASE:
@@ -96,10 +95,13 @@ def added_elements(way, n, kappa, diffuse, radiance):
     (23) divides by cos_i cos_s and reflects more than it receives at grazing; the bounded
     form of the Beard-Maxwell model is 2 rho/(cos_i + cos_s).
     """
+    lambertian = diffuse.diffuse_albedo / pi
+    if not diffuse.has_more:
+        return lambertian, 0.0, 0.0, 0.0, 0.0
     grazing = diffuse.grazing_albedo / pi
     if diffuse.grazing_form == BOUNDED:
         grazing = 2.0 * grazing / (way.cos_i + way.cos_s)
     else:
         grazing = grazing / (way.cos_i * way.cos_s)
     m00, m01, m10, m11, m22 = volume_elements(way, n, kappa, diffuse, radiance)
-    return m00 + grazing + diffuse.diffuse_albedo / pi, m01, m10, m11, m22
+    return m00 + grazing + lambertian, m01, m10, m11, m22

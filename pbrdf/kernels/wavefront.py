@@ -224,10 +224,13 @@ def advance_rays(terrain, frame, faces, state, cell, active, record, optics, tal
             cell[k, FACE] = 2 * ((i + guard_x) * mesh_ny + j + guard_y) + facet
             slope_x, slope_y = facet_slopes(terrain, i, j, facet)
             (
-                state[k, KX], state[k, KY], state[k, KZ], state[k, SX], state[k, SY], state[k, SZ],
-                _, record[bounces, k, COS_IN], record[bounces, k, TURN_C], record[bounces, k, TURN_S],
+                state[k, KX], state[k, KY], state[k, KZ],
+                state[k, SX], state[k, SY], state[k, SZ],
+                _, record[bounces, k, COS_IN],
+                record[bounces, k, TURN_C], record[bounces, k, TURN_S],
             ) = bounce(
-                state[k, KX], state[k, KY], state[k, KZ], state[k, SX], state[k, SY], state[k, SZ],
+                state[k, KX], state[k, KY], state[k, KZ],
+                state[k, SX], state[k, SY], state[k, SZ],
                 slope_x, slope_y,
             )  # fmt: skip
             record[bounces, k, COS_OUT] = SPECULAR
@@ -264,7 +267,8 @@ def advance_rays(terrain, frame, faces, state, cell, active, record, optics, tal
             kept += 1
             continue
         record[bounces, k, TURN_C], record[bounces, k, TURN_S] = exit_turn(
-            state[k, KX], state[k, KY], state[k, KZ], state[k, SX], state[k, SY], state[k, SZ],
+            state[k, KX], state[k, KY], state[k, KZ],
+            state[k, SX], state[k, SY], state[k, SZ],
             state[k, COS_PHI], state[k, SIN_PHI],
         )  # fmt: skip
         tally_path(

@@ -39,14 +39,16 @@ class GaussianSurface:
     -----
     White noise is filtered with the square root of the discrete spectrum of the periodic
     autocorrelation, so amplitudes as well as phases are random and heights are jointly
-    Gaussian on the grid. Equation (19), slope = √2 height / length, holds for the continuous
-    surface; facets average over one cell, which lowers the slope by 1 - 1/(4 m²) for m
-    cells a correlation length. The forward differences of the grid are what `slope_rms`
-    fixes.
+    Gaussian on the grid. Equation (19), slope = √2 height / length, holds for the
+    continuous surface; facets average over one cell, which lowers the slope by
+    1 - 1/(4 m²) for m cells a correlation length. The forward differences of the grid are
+    what `slope_rms` fixes.
 
     Examples
     --------
-    >>> surface = GaussianSurface(shape=(256, 256), spacing=1.0, corr_length=16, slope_rms=0.3)
+    >>> surface = GaussianSurface(
+    ...     shape=(256, 256), spacing=1.0, corr_length=16, slope_rms=0.3
+    ... )
     >>> surface.sample(seed=1)
     HeightMap(256 x 256 nodes, spacing=(1.0, 1.0) um, periodic)
     >>> round(surface.ensemble_height_rms, 3)
@@ -125,7 +127,7 @@ class GaussianSurface:
         )
 
     def _slope_per_height(self, axis: int) -> float:
-        """Rms forward difference of a surface of unit rms height: 2 (C(0) - C(1)) / step²."""
+        """Rms forward difference at unit rms height, from 2 (C(0) - C(1)) / step²."""
         n, step, length = self.shape[axis], self._steps[axis], self._lengths[axis]
         # The images of the periodic autocorrelation matter below 6 correlation lengths only
         periodic = self._correlation(axis)

@@ -29,8 +29,8 @@ class HeightMap:
     Raises
     ------
     ValueError
-        If the heights are not a two-dimensional array of at least 2 x 2 nodes, are infinite,
-        or the spacing is not positive.
+        If the heights are not a two-dimensional array of at least 2 x 2 nodes, are
+        infinite, or the spacing is not positive.
 
     Examples
     --------

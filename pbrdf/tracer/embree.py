@@ -37,7 +37,7 @@ class EmbreeField:
         return cls(field=field, mesh=mesh, scene=scene)
 
     def first_faces(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Number of the first face met by each ray (rays, 3), -1 for none."""
+        """Find the first face met by each ray (rays, 3), -1 for none."""
         faces: np.ndarray = self.scene.run(origins, directions, output=True)["primID"]
         return faces
 
@@ -49,7 +49,7 @@ def trace_waves(
     optics: shading.Optics,
     tally: shading.Tally,
 ) -> None:
-    """Trace one incident direction in chunks of rays, bounce by bounce, and add to the tally."""
+    """Trace one incident direction in chunks of rays, and add to the tally."""
     terrain, frame = target.field.terrain, target.mesh.frame
     size = min(CHUNK, source.n_rays)
     state = np.empty((size, wavefront.N_STATE))

@@ -70,7 +70,7 @@ class Field:
         return (nx, ny) if self.periodic else (nx - 1, ny - 1)
 
     def entry_lines(self, launch: np.ndarray, n_rays: int) -> int:
-        """Number of lines that space `n_rays` rays evenly both along and across them."""
+        """Count the lines that space `n_rays` rays evenly both along and across them."""
         width, depth = launch[2] * self.pitch[0], launch[3] * self.pitch[1]
         aspect = min(width, depth) / max(width, depth)
         return max(1, round(np.sqrt(n_rays * aspect)))

@@ -55,8 +55,8 @@ class Plan:
 class Tally:
     """Flux, energy and counts of one sample, per incident direction.
 
-    `flux` has the shape of the plan and is not normalised; `energy` (angles, wavelengths, 4)
-    is what was absorbed, truncated, leaked and lost sideways; `counts` (angles, 6) as in
+    `flux` has the shape of the plan and is not normalised; `energy` (angles, wavelengths,
+    4) is what was absorbed, truncated, leaked and lost sideways; `counts` (angles, 6) as in
     `pbrdf.kernels.shading`.
     """
 

@@ -20,7 +20,7 @@ def trace_sample(
     the stream, so that neither the number of threads nor the intersector changes the rays.
     """
     tally = Tally.empty(plan)
-    edges = bin_edges(plan.n_theta, plan.n_dphi)
+    zenith, azimuth = bin_edges(plan.n_theta, plan.n_dphi)
     optics = shading.Optics(plan.n, plan.kappa, plan.base, plan.n_stokes)
     rng = np.random.default_rng(seed)
     shifts = rng.random((len(plan.theta_i), 3))
@@ -34,7 +34,7 @@ def trace_sample(
             shifts[index], streams[index],
         )  # fmt: skip
         bins = shading.Tally(
-            *edges, tally.flux[index], tally.energy[index], tally.counts[index],
+            zenith, azimuth, tally.flux[index], tally.energy[index], tally.counts[index],
             np.zeros((4, 4)),
         )  # fmt: skip
         if isinstance(target, EmbreeField):
