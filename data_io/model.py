@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,11 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["read_model", "write_model"]
 
 # In the file an angle carries its unit, and so is in degrees
-_ANGLES = {"shadow_omega_deg": "shadow_omega", "shadow_tau_deg": "shadow_tau"}
-_MODEL_KEYS = {
-    "slope_rms", "slope_distribution", "shadowing", "specular_gain", "diffuse_albedo",
-    *_ANGLES,
-}  # fmt: skip
+_ANGLES = ("shadow_omega", "shadow_tau")
 _MATERIAL_KEYS = {"n", "kappa", "name"}
 
 
@@ -41,7 +38,7 @@ def write_model(
     Raises
     ------
     ValueError
-        If the index is tabulated.
+        If the index or the slope distribution is tabulated.
     """
     import tomli_w
 
@@ -52,18 +49,10 @@ def write_model(
             "Use Material(*material.index(wavelength))."
         )
         raise ValueError(msg)
-    slopes = np.asarray(model.slope_rms).tolist()
-    table = {
-        "slope_rms": slopes,
-        "slope_distribution": model.slope_distribution,
-        "shadowing": model.shadowing,
-        "specular_gain": float(model.specular_gain),
-        "diffuse_albedo": float(model.diffuse_albedo),
-    }
-    if model.shadowing == "maxwell-beard":
-        table |= {
-            key: float(np.rad2deg(getattr(model, name))) for key, name in _ANGLES.items()
-        }
+    if not isinstance(model.slope_distribution, str):
+        msg = "slope_distribution must be a name to be written, got a table of slopes."
+        raise ValueError(msg)
+    table = {_key(name): _to_file(name, getattr(model, name)) for name in _names(model)}
     index: dict[str, Any] = {} if material.name is None else {"name": material.name}
     index |= {"n": float(material.n), "kappa": float(material.kappa)}
     text = tomli_w.dumps({"model": table, "material": index, **(notes or {})})
@@ -94,18 +83,36 @@ def read_model(path: str | Path) -> "MicrofacetModel":
 
     source = Path(path)
     document = _load(source)
-    table = _table(document, "model", _MODEL_KEYS, {"slope_rms"}, source)
+    names = {_key(name): name for name in _names(MicrofacetModel)}
+    table = _table(document, "model", set(names), {"slope_rms"}, source)
     index = _table(document, "material", _MATERIAL_KEYS, {"n"}, source)
-    for key, name in _ANGLES.items():
-        if key in table:
-            table[name] = np.deg2rad(table.pop(key))
-    if isinstance(table["slope_rms"], list):
-        table["slope_rms"] = tuple(table["slope_rms"])
+    values = {names[key]: _from_file(names[key], value) for key, value in table.items()}
     try:
-        return MicrofacetModel(Material(**index), **table)
+        return MicrofacetModel(Material(**index), **values)
     except (TypeError, ValueError) as error:
         problem, _, cure = str(error).partition(". ")
         raise DataFileError(source, problem, cure or "Mend the value.") from error
+
+
+def _names(model: Any) -> list[str]:
+    """Return the parameters of the model beside its material."""
+    return [field.name for field in fields(model) if field.name != "material"]
+
+
+def _key(name: str) -> str:
+    return f"{name}_deg" if name in _ANGLES else name
+
+
+def _to_file(name: str, value: Any) -> Any:
+    if isinstance(value, str):
+        return value
+    return np.asarray(np.rad2deg(value) if name in _ANGLES else value, float).tolist()
+
+
+def _from_file(name: str, value: Any) -> Any:
+    if name in _ANGLES:
+        return float(np.deg2rad(value))
+    return tuple(value) if isinstance(value, list) else value
 
 
 def _load(source: Path) -> dict[str, Any]:
