@@ -1,0 +1,229 @@
+"""Hazards B1 to B6: self hits, offsets, coordinates, edges, boundaries, grazing light."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
+from pbrdf.kernels.heightfield import HIT, block_maxima, walk
+from pbrdf.tracer import embree
+from pbrdf.tracer.field import Field
+
+ANGLES = np.deg2rad([10.0, 60.0, 85.0])
+
+
+def gaussian(slope, nodes=256, cells=16.0):
+    return GaussianSurface(
+        shape=(nodes, nodes), spacing=1.0, corr_length=cells, slope_rms=slope
+    )
+
+
+def trace(surface, **options):
+    options = {
+        "n_rays": 6400,
+        "n_theta": 9,
+        "n_dphi": 12,
+        "stokes": "unpolarized",
+    } | options
+    return simulate(Scene(surface, Material.mirror()), ANGLES, **options)
+
+
+def shares(result):
+    """Rays by number of bounces: whole numbers."""
+    return np.rint(result.albedo.values * result.attrs["rays_per_direction"]).astype(int)
+
+
+@pytest.mark.parametrize("slope", [0.05, 0.3, 0.47])
+@pytest.mark.parametrize("skips", [True, False])
+def test_b01_b02_no_self_hits_no_losses_up_to_grazing(slope, skips):
+    result = trace(gaussian(slope).sample(2), skips=skips)
+    assert result.attrs["self_hits"] == 0
+    assert result.attrs["rays_leaked"] == [0, 0, 0]
+    assert result.attrs["rays_escaped"] == [6400] * 3
+
+
+@pytest.mark.parametrize("slope", [0.05, 0.3, 0.47])
+def test_b01_shares_do_not_depend_on_the_offset(slope, monkeypatch):
+    """A factor of 100 in Embree's offset moves fewer rays than the noise of counting."""
+    surface = gaussian(slope).sample(2)
+    build = embree.build_mesh
+    found = []
+    for factor in (0.1, 1.0, 10.0):
+        monkeypatch.setattr(
+            embree, "build_mesh", lambda field, f=factor: replace(
+                build(field), offset=f * build(field).offset
+            ),
+        )  # fmt: skip
+        result = trace(surface, skips=False)
+        assert result.attrs["self_hits"] == 0
+        found.append(shares(result))
+    assert np.abs(np.array(found) - found[1]).max() <= np.sqrt(6400) / 2
+
+
+@pytest.mark.parametrize("skips", [True, False])
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_b03_any_unit_of_length(skips, scale):
+    surface = gaussian(0.47).sample(2)
+    scaled = HeightMap(surface.heights * scale, scale, periodic=True)
+    plain, other = trace(surface, skips=skips), trace(scaled, skips=skips)
+    # Only rounding differs: a ray or two on an edge
+    assert np.abs(shares(plain) - shares(other)).sum() <= 4
+    assert other.attrs["rays_leaked"] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("skips", [True, False])
+def test_b03_far_from_the_origin(skips):
+    surface = gaussian(0.47).sample(2)
+    shifted = HeightMap(surface.heights + 1e4, 1.0, periodic=True)
+    plain, other = trace(surface, skips=skips), trace(shifted, skips=skips)
+    assert np.abs(shares(plain) - shares(other)).sum() <= 4
+    assert other.attrs["rays_leaked"] == [0, 0, 0]
+    assert other.attrs["self_hits"] == 0
+
+
+def test_b03_powers_of_two_change_no_bit():
+    surface = gaussian(0.47, nodes=128).sample(2)
+    doubled = HeightMap(surface.heights * 2.0**20, 2.0**20, periodic=True)
+    assert_array_equal(trace(surface).brdf, trace(doubled).brdf)
+
+
+SURFACES = {
+    "flat": np.zeros((32, 24)),
+    "rough": np.random.default_rng(1).standard_normal((32, 24)),
+}
+
+
+@pytest.mark.parametrize("name", list(SURFACES))
+def test_b04_edges_and_vertices_are_never_missed_by_the_walk(name):
+    heights = SURFACES[name]
+    maxima, levels = block_maxima(heights, True)
+    rng = np.random.default_rng(3)
+    z_top = heights.max() + 4.0
+    missed = 0
+    for _ in range(4000):
+        # A vertex, or the middle of an edge or a diagonal, approached from any direction
+        u, v = [(0, 0), (0.5, 0), (0, 0.5), (0.5, 0.5)][rng.integers(4)]
+        x, y = rng.integers(32) + u, rng.integers(24) + v
+        speed = [*(rng.integers(-8, 9, 2) / 8), -rng.integers(1, 9) / 8]
+        # Eighths are exact: start at a place from which the ray runs through the target
+        t = (z_top - 0.0) / speed[2]
+        start_x, start_y = (x + t * speed[0]) % 32, (y + t * speed[1]) % 24
+        i, j = int(start_x), int(start_y)
+        fate, *place = walk(
+            heights, maxima, levels, heights.max(), True, i, j, -1,
+            start_x - i, start_y - j, z_top, *speed, 0.0, 10_000,
+        )  # fmt: skip
+        missed += fate != HIT or not np.isfinite(place).all()
+    assert missed == 0
+
+
+@pytest.mark.parametrize("name", list(SURFACES))
+def test_b04_edges_and_vertices_are_rarely_missed_by_embree(name):
+    """Bound: fewer than 1e-4 of rays aimed exactly at vertices and edges."""
+    field = Field.of(HeightMap(SURFACES[name], 1.0, periodic=True))
+    target = embree.EmbreeField.of(field)
+    vertices, faces = target.mesh.vertices, target.mesh.faces
+    corner = vertices[faces]
+    middle = 0.5 * (corner + np.roll(corner, -1, axis=1))
+    aim = np.concatenate([corner, middle]).reshape(-1, 3)
+    # Away from the rim of the mesh
+    inner = np.abs(aim[:, :2]).max(axis=1) < 0.8 * np.abs(vertices[:, :2]).max(axis=0).min()
+    aim = aim[inner]
+    rng = np.random.default_rng(4)
+    missed = rays = 0
+    for _ in range(8):
+        direction = np.array([*rng.integers(-2, 3, 2) / 8, -1.0])
+        origin = aim - 4.0 * direction
+        faces_hit = target.first_faces(
+            np.ascontiguousarray(origin, dtype=np.float32),
+            np.tile(direction.astype(np.float32), (len(aim), 1)),
+        )
+        missed += int((faces_hit < 0).sum())
+        rays += len(aim)
+    assert rays > 20_000
+    assert missed < 1e-4 * rays, (missed, rays)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("skips", [True, False])
+def test_b04_generic_rays_do_not_leak(skips):
+    """Bound: 1e-7 of the rays. No path of 1.2e7 may end below the surface."""
+    result = trace(gaussian(0.47, nodes=512), realizations=8, n_rays=500_000, skips=skips)
+    assert sum(result.attrs["rays_leaked"]) == 0
+    assert result.attrs["self_hits"] == 0
+
+
+@pytest.mark.parametrize("skips", [True, False])
+def test_b05_flat_mirror_at_grazing_is_hit_by_every_ray(skips):
+    result = simulate(
+        Scene(HeightMap.flat(size=(3.0, 2.0)), Material.mirror()), np.deg2rad([85.0, 89.9]),
+        n_rays=6400, n_theta=9, n_dphi=12, skips=skips,
+    )  # fmt: skip
+    assert_allclose(result.albedo.sel(bounces="1"), 1.0, atol=1e-12)
+    assert result.side_exits.values.max() == 0
+
+
+def test_b05_periodic_surfaces_have_no_sides():
+    assert trace(gaussian(0.47).sample(1)).side_exits.values.max() == 0
+
+
+FINITE = HeightMap(gaussian(0.3, nodes=512).sample(6).heights, 1.0, periodic=False)
+
+
+def trace_finite(n_rays=32_000):
+    return simulate(
+        Scene(FINITE, Material.mirror()), np.deg2rad([10.0, 60.0]), n_rays=n_rays,
+        n_theta=9, n_dphi=12, stokes="unpolarized",
+    )  # fmt: skip
+
+
+def test_b05_finite_maps_count_side_exits_in_neither_part():
+    """What leaves sideways is reported; the rest still balances."""
+    result = trace_finite()
+    budget = result.albedo.sum("bounces") + result.truncated + result.leaked
+    assert_allclose(budget, 1.0, atol=1e-9)
+    exits = (
+        np.array(result.attrs["rays_left_sideways"]) / result.attrs["rays_per_direction"]
+    )
+    assert_allclose(result.side_exits, exits)
+    assert exits.max() < 0.01
+
+
+@pytest.mark.xfail(reason="0.2 % at 10 and 0.6 % at 60 degrees leave sideways", strict=True)
+def test_b05_side_exits_of_a_finite_map_meet_the_bound():
+    """Bound: fewer than 1e-3 of the rays; slope 0.3, 32 correlation lengths a side."""
+    assert trace_finite().side_exits.values.max() < 1e-3
+
+
+@pytest.mark.xfail(
+    reason="a batch without a counted ray enters the mean as dark", strict=True
+)
+def test_b05_lost_batches_do_not_darken_a_finite_map():
+    """Two rays a batch, most leave sideways: still albedo 1 for what is counted."""
+    x = 0.18 * np.arange(40)[:, None] * np.ones(40)
+    result = simulate(
+        Scene(HeightMap(x, 1.0, periodic=False), Material.mirror()), np.deg2rad(60.0),
+        n_rays=64, n_theta=9, n_dphi=12,
+    )  # fmt: skip
+    assert 0 < result.side_exits.item() < 1
+    assert_allclose(result.albedo.sum("bounces"), 1.0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_b06_grazing_bins_converge_with_the_cells_of_a_correlation_length():
+    """Slope 0.30 at 60 degrees: shares of 16 and 32 cells a length agree to a few 1e-3."""
+    found, errors = [], []
+    for cells, nodes in ((16, 512), (32, 1024)):
+        result = simulate(
+            Scene(gaussian(0.3, nodes, float(cells)), Material.mirror()), np.deg2rad(60.0),
+            n_rays=60_000, realizations=64, n_theta=18, n_dphi=4, stokes="unpolarized",
+        )  # fmt: skip
+        weight = result.projected_solid_angle
+        grazing = (result.brdf_total * weight).isel(theta_s=17).sum("dphi").values.ravel()
+        found.append([*result.albedo.values.ravel(), *grazing])
+        errors.append([*result.albedo_stderr.values.ravel(), 2e-4])
+    apart = np.abs(np.subtract(*found))
+    # Expected moves with the cell size: -2e-5, -1.6e-4, +1.8e-4
+    assert (apart < 5 * np.hypot(*errors) + 5e-4).all(), (apart, errors)
