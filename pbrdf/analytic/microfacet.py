@@ -194,7 +194,7 @@ class MicrofacetModel:
         if columns[4].size != columns[5].size:
             columns[4:] = [np.broadcast_to(c, size).copy() for c in columns[4:]]
         out = np.empty((size, 4, 4))
-        _fill(columns, self._surface(), out)
+        _fill(columns, self.surface(), out)
         return out.reshape(*shape, 4, 4)
 
     def _tabulated(self, table: SlopeTable, columns: list[np.ndarray]) -> np.ndarray:
@@ -209,7 +209,7 @@ class MicrofacetModel:
         kernel.fill_tabulated(
             theta_i, theta_s, dphi, n, kappa, table.density_at(*slopes),
             table.overhang(theta_i, phi_i), table.overhang(theta_s, phi_i + dphi),
-            self._surface(), out,
+            self.surface(), out,
         )  # fmt: skip
         return out
 
@@ -221,7 +221,7 @@ class MicrofacetModel:
         norm = slope_norm(law, slope_x, slope_y)
         return Roughness(law, slope_x, slope_y, slope_x == slope_y, norm)
 
-    def _surface(self) -> kernel.Surface:
+    def surface(self) -> kernel.Surface:
         """Numbers of the model as the kernels take them."""
         rule = SHADOWING[self.shadowing].code
         return kernel.Surface(
@@ -241,7 +241,7 @@ class MicrofacetModel:
             volume_albedo,
             VOLUME_FORMS[self.volume_form].code,
             float(self.volume_depolarization),
-            volume_albedo > 0,
+            volume_albedo > 0 or self.grazing_albedo > 0,
         )
 
 

@@ -123,15 +123,15 @@ def brdf_expression(  # noqa: PLR0913  (one keyword for each choice of the model
     rule = code_of(SHADOWING, shadowing, "shadowing")
     slope_x, slope_y = given["slope_rms_x"], given["slope_rms_y"]
     norm = rebind(slopes.slope_norm, operations, copies)(law, slope_x, slope_y)
-    albedo = given["volume_albedo"]
+    more = (given["volume_albedo"], given["grazing_albedo"])
     diffuse = volume.Diffuse(
         given["diffuse_albedo"],
         given["grazing_albedo"],
         code_of(GRAZING_FORMS, grazing_form, "grazing_form"),
-        albedo,
+        given["volume_albedo"],
         code_of(VOLUME_FORMS, volume_form, "volume_form"),
         given["volume_depolarization"],
-        not (isinstance(albedo, float | int) and albedo == 0),
+        not all(isinstance(value, float | int) and value == 0 for value in more),
     )
     surface = microfacet.Surface(
         slopes.Roughness(law, slope_x, slope_y, slope_x is slope_y, norm),

