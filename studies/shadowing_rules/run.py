@@ -93,7 +93,7 @@ def table(rows):
 
 def main():
     parser = ArgumentParser(description=__doc__)
-    parser.add_argument("--realizations", type=int, default=64)
+    parser.add_argument("--realizations", type=int, default=32)
     parser.add_argument("--rays", type=int, default=100_000)
     parser.add_argument("--workers", type=int, default=None)
     options = parser.parse_args()
