@@ -1,0 +1,125 @@
+"""The whole way on a small example, through the command as a user types it."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import data_io
+from pbrdf import Material, MicrofacetModel
+from pbrdf.cli import main
+
+SLOPE, CORR_LENGTH, GAIN, DIFFUSE = 0.2, 8.0, 0.7, 0.1
+FEW = ["--n-rays", "20000", "--realizations", "12"]
+
+
+def write_profile(path: Path) -> None:
+    """A Gaussian profile of 300 correlation lengths, drawn as a sum of cosines."""
+    rng = np.random.default_rng(11)
+    x = np.arange(0.0, 300 * CORR_LENGTH, 1.0)
+    height_rms = SLOPE * CORR_LENGTH / np.sqrt(2)
+    # exp(-r²/l²) is the characteristic function of wavenumbers of deviation sqrt(2)/l
+    wavenumber = rng.normal(scale=np.sqrt(2) / CORR_LENGTH, size=3000)
+    phase = rng.uniform(0, 2 * np.pi, wavenumber.size)
+    z = np.cos(x[:, None] * wavenumber + phase).sum(axis=1)
+    z *= height_rms * np.sqrt(2 / wavenumber.size)
+    rows = "".join(f"{a:.3f},{b:.6f}\n" for a, b in zip(x, z, strict=True))
+    path.write_text("x_um,z_um\n" + rows)
+
+
+def write_scan(path: Path, elements: tuple[str, ...]) -> None:
+    """A scan of the analytical model with 2 % noise."""
+    model = MicrofacetModel(
+        Material(1.5), SLOPE, specular_gain=GAIN, diffuse_albedo=DIFFUSE
+    )
+    view = np.deg2rad(np.arange(-60.0, 61.0, 4.0))
+    theta_s, dphi = np.abs(view), np.where(view > 0, np.pi, 0.0)
+    brdf = model.brdf(0.5, theta_s, dphi)
+    rng = np.random.default_rng(3)
+    data = {}
+    for element in elements:
+        sigma = 0.02 * brdf[:, 0, 0]
+        value = brdf[:, int(element[1]), int(element[2])]
+        data[element] = ("geometry", value + sigma * rng.standard_normal(view.size))
+        data[f"{element}_stderr"] = ("geometry", sigma)
+    coords = {"theta_i": np.full(view.size, 0.5), "theta_s": theta_s, "dphi": dphi}
+    data_io.write_goniometer(
+        xr.Dataset(data, {name: ("geometry", value) for name, value in coords.items()}),
+        path,
+    )
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a pipeline run on a polarised scan."""
+    folder = tmp_path_factory.mktemp("pipeline")
+    write_profile(folder / "profile.csv")
+    write_scan(folder / "scan.csv", ("M00", "M10"))
+    arguments = ["pipeline", str(folder / "profile.csv"), str(folder / "scan.csv"),
+                 "--n", "1.5", "-o", str(folder / "out"), *FEW]  # fmt: skip
+    assert main(arguments) == 0
+    return folder
+
+
+def test_every_file_is_there_and_nothing_else(finished: Path) -> None:
+    assert sorted(path.name for path in finished.iterdir()) == [
+        "out", "profile.csv", "scan.csv",
+    ]  # fmt: skip
+    assert sorted(path.name for path in (finished / "out").iterdir()) == [
+        "model.toml", "report.html", "result.nc", "scan.png", "surface.png",
+    ]  # fmt: skip
+
+
+def test_what_was_put_in_comes_out(finished: Path) -> None:
+    attrs = data_io.read_result(finished / "out" / "result.nc").attrs
+    slope = attrs["statistics"]["slope_rms"]
+    assert slope["low"] < SLOPE < slope["high"]
+    for curve in ("analytic_fit", "monte_carlo_fit"):
+        found = attrs[curve]["parameters"]
+        for name, true in (("specular_gain", GAIN), ("diffuse_albedo", DIFFUSE)):
+            assert abs(found[name]["value"] - true) < 3.5 * found[name]["stderr"], curve
+
+
+def test_the_model_can_be_loaded_again(finished: Path) -> None:
+    attrs = data_io.read_result(finished / "out" / "result.nc").attrs
+    model = data_io.read_model(finished / "out" / "model.toml")
+    fitted = attrs["analytic_fit"]["parameters"]
+    assert model.specular_gain == fitted["specular_gain"]["value"]
+    assert model.slope_rms == attrs["statistics"]["slope_rms"]["value"]
+    assert model.brdf(0.5, 0.5, np.pi).shape == (4, 4)
+
+
+def test_the_report_needs_no_other_file(finished: Path) -> None:
+    page = (finished / "out" / "report.html").read_text()
+    assert page.count('src="data:image/png;base64,') == 2
+    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    for word in ("specular_gain", "slope_rms", "chi2 / dof", "Monte Carlo", "seconds"):
+        assert word in page
+    # A number of the fits never stands without its error
+    assert re.search(r"specular_gain</td><td>0\.\d+ ± 0\.\d+", page)
+
+
+def test_results_are_replaced_only_on_demand(
+    finished: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = (finished / "out" / "result.nc").stat().st_mtime_ns
+    arguments = ["pipeline", str(finished / "profile.csv"), str(finished / "scan.csv"),
+                 "--n", "1.5", "-o", str(finished / "out")]  # fmt: skip
+    assert main(arguments) == 2
+    assert "--force" in capsys.readouterr().err
+    assert (finished / "out" / "result.nc").stat().st_mtime_ns == before
+
+
+def test_an_unpolarised_scan_says_what_cannot_be_known(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_scan(tmp_path / "scan.csv", ("M00",))
+    arguments = ["pipeline", str(finished / "profile.csv"), str(tmp_path / "scan.csv"),
+                 "--n", "1.5", "-o", str(tmp_path / "out"), *FEW]  # fmt: skip
+    assert main(arguments) == 0
+    said = capsys.readouterr().out
+    assert "Only unpolarised reflectance was measured" in said
+    assert "not measured" not in said
+    assert "no measurement supports them" in (tmp_path / "out" / "report.html").read_text()
