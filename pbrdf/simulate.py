@@ -3,7 +3,7 @@
 import os
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 
@@ -19,7 +19,8 @@ from pbrdf.surface import GaussianSurface, HeightMap
 from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.plan import Moments, Plan, Tally
-from pbrdf.tracer.trace import trace_sample
+from pbrdf.tracer.skips import chosen_skips, explanation
+from pbrdf.tracer.trace import prepare, trace_sample
 from pbrdf.validity import geometric_optics_warnings
 
 STOKES_COUNT = {"full": 4, "linear": 3, "unpolarized": 1}
@@ -47,7 +48,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
     stokes: str = "full",
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
-    skips: bool = True,
+    skips: bool | Iterable[str] = True,
+    explain: bool = False,
 ) -> xr.Dataset:
     """Trace light from the source to the hemisphere and bin it as Mueller BRDF.
 
@@ -82,9 +84,11 @@ def simulate(  # noqa: PLR0913  (the public signature)
         Threads; all cores by default. Does not change the result.
     progress : callable, optional
         Called with (samples done, samples in all).
-    skips : bool
-        Follow rays over a height field by an exact float64 walk, without Embree; False
-        sends every ray through Embree. Both trace the same rays.
+    skips : bool or names of `pbrdf.tracer.skips.SKIPS`
+        What may be left out without changing the result; False sends every ray through
+        Embree. The same rays are traced in any case.
+    explain : bool
+        Say in the attribute `explanation` what was left out and why.
 
     Returns
     -------
@@ -125,10 +129,11 @@ def simulate(  # noqa: PLR0913  (the public signature)
     angles = _angles(theta_i)
     waves = _wavelengths(wavelength)
     n, kappa, base = _constants(scene, waves)
-    if base.shape[1] > 0 and not skips:
+    allowed = chosen_skips(skips)
+    if base.shape[1] > 0 and "walk" not in allowed:
         msg = (
-            "skips must be True over a diffuse base, got False. Embree alone traces opaque "
-            "Fresnel surfaces only."
+            'skips must hold "walk" over a diffuse base, got '
+            f"{sorted(allowed)}. The Embree route traces opaque Fresnel surfaces only."
         )
         raise ValueError(msg)
     plan = Plan(
@@ -142,6 +147,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
         n_stokes=_stokes_count(stokes),
         n_theta=_count("n_theta", n_theta, 1),
         n_dphi=_even("n_dphi", n_dphi),
+        skips=allowed,
     )
     target = None if target_rel_error is None else _target(target_rel_error)
     _check_scene(scene)
@@ -155,10 +161,10 @@ def simulate(  # noqa: PLR0913  (the public signature)
         shared = (
             surface if isinstance(surface, HeightMap) else surface.sample(root.spawn(1)[0])
         )
-        draw = partial(_trace_fixed, _prepare(shared, skips), plan)
+        draw = partial(_trace_fixed, prepare(shared, allowed), plan)
     else:
         assert isinstance(surface, GaussianSurface)
-        draw = partial(_trace_realization, surface, plan, skips)
+        draw = partial(_trace_realization, surface, plan)
 
     moments = Moments(plan)
     limit = samples if target is None else max(samples, MAX_SAMPLES)
@@ -184,15 +190,11 @@ def simulate(  # noqa: PLR0913  (the public signature)
             "stokes": stokes,
             "phi_i": "uniform" if plan.phi_i is None else plan.phi_i,
             "target_rel_error": np.nan if target is None else target,
-            "intersector": "height-field walk" if skips else "embree",
+            "intersector": "height-field walk" if "walk" in allowed else "embree",
+            "explanation": _explain(scene, plan) if explain else [],
             "warnings": notes,
         },
     )
-
-
-def _prepare(surface: HeightMap, skips: bool) -> Field | EmbreeField:
-    field = Field.of(surface)
-    return field if skips else EmbreeField.of(field)
 
 
 def _trace_fixed(
@@ -202,10 +204,17 @@ def _trace_fixed(
 
 
 def _trace_realization(
-    surface: GaussianSurface, plan: Plan, skips: bool, seed: np.random.SeedSequence
+    surface: GaussianSurface, plan: Plan, seed: np.random.SeedSequence
 ) -> Tally:
     heights, rays = seed.spawn(2)
-    return trace_sample(_prepare(surface.sample(heights), skips), plan, rays)
+    return trace_sample(prepare(surface.sample(heights), plan.skips), plan, rays)
+
+
+def _explain(scene: Scene, plan: Plan) -> list[str]:
+    surface = scene.surface
+    sample = surface if isinstance(surface, HeightMap) else surface.sample(0)
+    steepest = float(Field.of(sample).terrain.steepest)
+    return explanation(plan, periodic=sample.periodic, steepest=steepest)
 
 
 def _in_order(

@@ -11,6 +11,7 @@ an edge or a vertex, and a ray that starts on a facet needs no offset: its clear
 is t times its speed away from the facet, without cancellation.
 """
 
+import math
 from collections import namedtuple
 
 import numpy as np
@@ -25,10 +26,10 @@ START_LEVEL = 3  # blocks of 8 cells: where a ray from above starts to look
 
 
 # A height field as the kernels take it: node heights, the pyramid of `block_maxima`, the
-# highest node, whether it repeats, the grid steps and the material of each cell (of no
-# size: all 0)
+# highest node, the largest slope (inf: not to be used), whether it repeats, the grid steps
+# and the material of each cell (of no size: all 0)
 Terrain = namedtuple(
-    "Terrain", "heights maxima levels z_top periodic pitch_x pitch_y labels"
+    "Terrain", "heights maxima levels z_top steepest periodic pitch_x pitch_y labels"
 )
 
 
@@ -53,6 +54,21 @@ def block_maxima(heights: np.ndarray, periodic: bool) -> tuple[np.ndarray, np.nd
         offset += top.size
         if max(top.shape) <= 2:
             return np.concatenate(levels), np.array(table, dtype=np.int64)
+
+
+@jit
+def steepest_slope(heights, periodic, pitch_x, pitch_y):
+    """Largest slope of any facet, in its own direction of steepest ascent."""
+    nx = heights.shape[0] if periodic else heights.shape[0] - 1
+    ny = heights.shape[1] if periodic else heights.shape[1] - 1
+    largest = 0.0
+    for i in range(nx):
+        for j in range(ny):
+            z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
+            low = ((z10 - z00) / pitch_x) ** 2 + ((z11 - z10) / pitch_y) ** 2
+            high = ((z11 - z01) / pitch_x) ** 2 + ((z01 - z00) / pitch_y) ** 2
+            largest = max(largest, max(low, high))
+    return math.sqrt(largest)
 
 
 @jit(inline="always")
@@ -253,3 +269,18 @@ def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, m
         if clear < 0.0 and level < levels.shape[0]:
             level += 1
     return LOST, i, j, -1, u, v, z + speed_z * t
+
+
+@jit(inline="always")
+def leave_facet(terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate, max_steps):
+    """Follow a ray along the unit vector k from a facet to the next one it meets.
+
+    A ray that rises more steeply than any facet can meet none.
+    """
+    level = math.sqrt(k_x * k_x + k_y * k_y)
+    if k_z >= terrain.steepest * level:
+        return ESCAPED, i, j, -1, u, v, z
+    return walk(
+        terrain, i, j, facet, u, v, z,
+        k_x / terrain.pitch_x, k_y / terrain.pitch_y, k_z, leave_rate, max_steps,
+    )  # fmt: skip

@@ -22,6 +22,7 @@ from pbrdf.kernels.heightfield import (
     SIDE,
     corner_heights,
     facet_slopes,
+    leave_facet,
     plane_height,
     walk,
 )
@@ -148,7 +149,7 @@ def trace_ray(
 
     `fate` says what became of it so far: HIT on the facet given, or what `walk` returned.
     """
-    pitch_x, pitch_y, labels = terrain.pitch_x, terrain.pitch_y, terrain.labels
+    labels = terrain.labels
     max_bounces = record.shape[0] - 1
     splits = optics.base.shape[1] > 0
     for w in range(tally.energy.shape[0]):
@@ -194,10 +195,9 @@ def trace_ray(
             record[bounces, 0, LABEL] = labels[i, j] if labels.size > 0 else 0
             bounces += 1
             tally.counts[N_SEGMENTS] += 1
-            fate, i, j, facet, u, v, z = walk(
-                terrain, i, j, facet, u, v, z,
-                k_x / pitch_x, k_y / pitch_y, k_z, leave_rate, MAX_STEPS,
-            )  # fmt: skip
+            fate, i, j, facet, u, v, z = leave_facet(
+                terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate, MAX_STEPS
+            )
 
         record[bounces, 0, TURN_C], record[bounces, 0, TURN_S] = exit_turn(
             k_x, k_y, k_z, s_x, s_y, s_z, cos_phi, sin_phi
@@ -225,12 +225,11 @@ def trace_ray(
         record[bounces, 0, COS_OUT] = waiting[n_waiting, W_COS]
         bounces += 1
         tally.counts[N_SEGMENTS] += 1
-        fate, i, j, facet, u, v, z = walk(
+        fate, i, j, facet, u, v, z = leave_facet(
             terrain, int(waiting[n_waiting, W_I]), int(waiting[n_waiting, W_J]),
             int(waiting[n_waiting, W_FACET]), waiting[n_waiting, W_U],
             waiting[n_waiting, W_V], waiting[n_waiting, W_Z],
-            k_x / pitch_x, k_y / pitch_y, k_z,
-            waiting[n_waiting, W_RATE], MAX_STEPS,
+            k_x, k_y, k_z, waiting[n_waiting, W_RATE], MAX_STEPS,
         )  # fmt: skip
 
 

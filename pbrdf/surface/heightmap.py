@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pbrdf.errors import require
+from pbrdf.surface.mend import fill_holes, mirror_edges
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False, init=False)
@@ -134,6 +135,47 @@ class HeightMap:
             along_x = np.diff(self.heights, axis=0)
             along_y = np.diff(self.heights, axis=1)
         return along_x / dx, along_y / dy
+
+    def filled(self) -> "HeightMap":
+        """Copy with every hole closed by the membrane that its rim spans.
+
+        A missing node takes the mean of its neighbours (Laplace's equation), so that
+        heights stay within those of the rim; slopes inside a hole are too low. `missing`
+        says how much of the map this concerns.
+
+        Raises
+        ------
+        ValueError
+            If more than half of the heights are missing.
+
+        Examples
+        --------
+        >>> holed = HeightMap([[0.0, 1.0, 2.0], [0.0, np.nan, 2.0], [0.0, 1.0, 2.0]], 1.0)
+        >>> float(holed.filled().heights[1, 1])
+        1.0
+        """
+        heights = fill_holes(self.heights, periodic=self.periodic)
+        return HeightMap(heights, self.spacing, periodic=self.periodic, labels=self.labels)
+
+    def mirrored(self) -> "HeightMap":
+        """Copy made periodic by reflection at its far edges, without a step at the seam.
+
+        It is twice as long on both axes, and every slope occurs with both signs: the mean
+        tilt and any skewness of the slopes are lost.
+
+        Examples
+        --------
+        >>> HeightMap([[0.0, 1.0, 3.0], [0.0, 1.0, 3.0]], 1.0).mirrored().heights
+        array([[0., 1., 3., 1.],
+               [0., 1., 3., 1.]])
+        """
+        labels = self.labels
+        if labels is not None:
+            labels = np.concatenate([labels, labels[::-1]], axis=0)
+            labels = np.concatenate([labels, labels[:, ::-1]], axis=1)
+        return HeightMap(
+            mirror_edges(self.heights), self.spacing, periodic=True, labels=labels
+        )
 
 
 def _material_numbers(labels: npt.ArrayLike, cells: tuple[int, int]) -> np.ndarray:

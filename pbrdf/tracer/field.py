@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbrdf.kernels.heightfield import Terrain, block_maxima
+from pbrdf.kernels.heightfield import Terrain, block_maxima, steepest_slope
 from pbrdf.surface.heightmap import HeightMap
 
 # A finite map keeps a rim this many height ranges wide free of entry points, at most an
@@ -41,6 +41,7 @@ class Field:
             maxima=maxima,
             levels=levels,
             z_top=float(surface.heights.max()),
+            steepest=steepest_slope(surface.heights, surface.periodic, *surface.spacing),
             periodic=surface.periodic,
             pitch_x=surface.spacing[0],
             pitch_y=surface.spacing[1],

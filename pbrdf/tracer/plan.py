@@ -29,6 +29,8 @@ class Plan:
         4 for (I, Q, U, V), 3 without V, 1 for I alone.
     n_theta, n_dphi : int
         Detector bins.
+    skips : frozenset of str
+        Names of the skips of `pbrdf.tracer.skips` that are allowed.
     """
 
     theta_i: np.ndarray
@@ -41,6 +43,7 @@ class Plan:
     n_stokes: int
     n_theta: int
     n_dphi: int
+    skips: frozenset[str] = frozenset()
 
     @property
     def tally_shape(self) -> tuple[int, ...]:

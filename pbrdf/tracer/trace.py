@@ -1,14 +1,25 @@
 """Trace one surface sample, by the exact walk or by Embree."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from pbrdf.kernels import shading
 from pbrdf.kernels.binning import bin_edges
 from pbrdf.kernels.entry import Source
 from pbrdf.kernels.transport import sweep_batch, trace_batch
+from pbrdf.surface.heightmap import HeightMap
 from pbrdf.tracer.embree import EmbreeField, trace_waves
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.plan import Plan, Tally
+
+
+def prepare(surface: HeightMap, skips: frozenset[str]) -> Field | EmbreeField:
+    """Make a surface ready for tracing with the skips allowed: the walk, or else Embree."""
+    field = Field.of(surface)
+    if "steep" not in skips:
+        field = replace(field, terrain=field.terrain._replace(steepest=np.inf))
+    return field if "walk" in skips else EmbreeField.of(field)
 
 
 def trace_sample(
@@ -39,7 +50,7 @@ def trace_sample(
         )  # fmt: skip
         if isinstance(target, EmbreeField):
             trace_waves(target, source, plan.max_bounces, optics, bins)
-        elif field.periodic:
+        elif field.periodic and "sweep" in plan.skips:
             # One pass along each line of entry points finds all first facets
             sweep_batch(field.terrain, source, plan.max_bounces, optics, bins)
         else:

@@ -30,7 +30,7 @@ def send(heights, periodic, place, speed, facet=-1):
         leave_rate = speed[2] - slope[0] * speed[0] - slope[1] * speed[1]
         assert leave_rate > 0
     return walk(
-        Terrain(heights, maxima, levels, heights.max(), periodic, 1.0, 1.0, NO_LABELS),
+        Terrain(heights, maxima, levels, heights.max(), np.inf, periodic, 1.0, 1.0, NO_LABELS),
         i, j, facet, place[0] - i, place[1] - j, place[2], *speed, leave_rate, STEPS,
     )  # fmt: skip
 
@@ -234,7 +234,7 @@ def test_rays_that_leave_from_vertices_and_edges(seed, facet, corner, step_x, st
     maxima, levels = block_maxima(heights, True)
     leave_rate = speed[2] - slope[0] * speed[0] - slope[1] * speed[1]
     fate, ci, cj, found, _, _, cz = walk(
-        Terrain(heights, maxima, levels, heights.max(), True, 1.0, 1.0, NO_LABELS),
+        Terrain(heights, maxima, levels, heights.max(), np.inf, True, 1.0, 1.0, NO_LABELS),
         i, j, facet, u, v, z, *speed, leave_rate, STEPS,
     )  # fmt: skip
     place = np.array([i + u, j + v, z])

@@ -1,0 +1,72 @@
+"""What a scene does not need: work left out without a change of the result.
+
+Each skip is exact, and each can be switched off by its name, so that a test can compare.
+"""
+
+from collections.abc import Iterable
+
+from pbrdf.tracer.plan import Plan
+
+SKIPS = {
+    "walk": "rays over a height field need no mesh and no tree: an exact walk follows them",
+    "sweep": "first hits on a periodic surface need no search: one pass a line finds them",
+    "steep": "a ray that rises more steeply than every facet is not traced",
+}
+
+
+def chosen_skips(skips: bool | Iterable[str]) -> frozenset[str]:
+    """Names of the skips to use: all, none, or those named.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown.
+    """
+    if isinstance(skips, bool):
+        return frozenset(SKIPS) if skips else frozenset()
+    names = frozenset([skips] if isinstance(skips, str) else skips)
+    for name in sorted(names - frozenset(SKIPS)):
+        msg = f"skips must be True, False or names of {', '.join(SKIPS)}, got {name!r}."
+        raise ValueError(msg)
+    return names
+
+
+def explanation(plan: Plan, *, periodic: bool, steepest: float) -> list[str]:
+    """Say in sentences what a run leaves out and why.
+
+    Parameters
+    ----------
+    plan : Plan
+        The run.
+    periodic : bool
+        Whether the surface repeats.
+    steepest : float
+        Largest slope of a facet of one sample of the surface. [1]
+    """
+    lines = []
+    if "walk" in plan.skips:
+        lines.append("Embree: not built; an exact float64 walk settles every ray.")
+        if "sweep" in plan.skips and periodic:
+            lines.append(
+                "Search for first hits: none; one pass along each line finds them."
+            )
+        if "steep" in plan.skips:
+            lines.append(
+                f"Rays rising above a slope of {steepest:.3g} (the steepest facet of the first "
+                "sample): not traced."
+            )
+    else:
+        lines.append("Nothing skipped: Embree traces every ray.")
+    if plan.base.shape[1] == 0:
+        lines.append("Diffuse base: none, so no path is split; nothing is transmitted.")
+    if plan.max_bounces < 3:
+        lines.append(
+            f"Bounces beyond {plan.max_bounces}: not traced; their light is truncated."
+        )
+    if plan.n_stokes == 3:
+        lines.append("V: not computed in or out (it is followed inside paths).")
+    if plan.n_stokes == 1:
+        lines.append("All but M00: not computed (paths stay polarised inside).")
+    if len(plan.n) > 1:
+        lines.append(f"Tracing for {len(plan.n) - 1} of {len(plan.n)} wavelengths: shared.")
+    return lines
