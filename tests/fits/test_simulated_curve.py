@@ -20,7 +20,7 @@ def bins(n_theta: int = 60) -> tuple[np.ndarray, np.ndarray]:
 
 
 def simulated(model: MicrofacetModel = MODEL, n_theta: int = 60) -> xr.Dataset:
-    """What a simulation without noise would hold: the model, and more of it near grazing."""
+    """What a simulation without noise could hold: the model, brighter near grazing."""
     theta, dphi = bins(n_theta)
     brdf = model.brdf(THETA_I, theta[:, None], dphi[None, :])
     brdf = brdf * (1.0 + 0.2 * np.sin(theta)[:, None, None, None])
