@@ -24,7 +24,7 @@ MIN_EXPLAINED = 0.6
 # Columns less like a step than this are left out
 MIN_QUALITY = 0.4
 # An edge with more of those, or with more overhanging columns, is no graph z(x)
-MAX_UNCLEAR, MAX_OVERHANG = 0.3, 0.2
+MAX_UNCLEAR, MAX_OVERHANG = 0.3, 0.1
 # So many times less like a step than the usual worst, a column shows something else
 OUTLYING = 12.0
 # Beyond this angle the columns cut the surface too obliquely. [rad]

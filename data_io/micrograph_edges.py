@@ -265,11 +265,12 @@ def _step(
     # Beyond the window there is grain alone; the median leaves specks out
     beyond = np.where(within, 0, residual).sum(axis=0) / (~within).sum(axis=0)
     grain = float(np.median(beyond))
+    # Strong grain needs more columns for a verdict, and is not the same everywhere
+    columns = int(np.clip(np.ceil(grain / 0.004), 1, 61))
+    local = np.minimum(ndimage.uniform_filter1d(beyond, max(columns, 9)), 2 * grain)
     n = within.sum(axis=0)
-    excess = np.where(within, residual, 0).sum(axis=0) - n * grain
+    excess = np.where(within, residual, 0).sum(axis=0) - n * local
     mean_model = np.where(within, model, 0).sum(axis=0) / n
     spread = np.where(within, (model - mean_model) ** 2, 0).sum(axis=0)
-    # Strong grain needs more columns for a verdict
-    columns = int(np.clip(np.ceil(grain / 0.004), 1, 61))
     unlike = ndimage.uniform_filter1d(excess / np.maximum(spread, 1e-9), columns)
     return float(width), np.clip(1 - unlike, 0, 1)

@@ -161,16 +161,26 @@ def flatten(grey: np.ndarray) -> Levels | None:
     """
     from skimage.filters import threshold_otsu
 
-    smooth = ndimage.gaussian_filter(grey, 2.0)
+    # Smooth levels are fitted to a sample of the pixels
+    step = max(1, int(np.sqrt(grey.size / 60_000)))
+    sample = np.s_[step // 2 :: step, step // 2 :: step]
+    few, smooth = grey[sample], ndimage.gaussian_filter(grey, 2.0)[sample]
     if np.ptp(smooth) < 1e-6:
         return None
-    starts = [np.full(grey.shape, threshold_otsu(smooth)), _strip_thresholds(smooth)]
+    starts = [np.full(few.shape, threshold_otsu(smooth)), _strip_thresholds(smooth)]
+    v, u = (np.linspace(-1, 1, n) for n in grey.shape)
+    basis = _quadratics(v[sample[0]], u[sample[1]])
     fits = [
-        fit for start in starts if (fit := _fit_levels(grey, smooth, start)) is not None
+        fit
+        for start in starts
+        if (fit := _fit_levels(few, smooth, start, basis, 3.0 / step)) is not None
     ]
     if not fits:
         return None
-    dark, bright, explained = max(fits, key=lambda fit: fit[2])
+    dark_terms, bright_terms, explained = max(fits, key=lambda fit: fit[2])
+    dark, bright = _level(dark_terms, v, u), _level(bright_terms, v, u)
+    if (bright <= dark).any():
+        return None
     contrast = bright - dark
     phase = (grey - dark) / contrast
     # Differences of neighbours hold the grain alone; their median absolute value ignores
@@ -197,36 +207,50 @@ def _strip_thresholds(smooth: np.ndarray) -> np.ndarray:
     return np.broadcast_to(np.interp(np.arange(columns), centres, values), smooth.shape)
 
 
+def _quadratics(v: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Return 1, u, v, u², uv and v² on a grid of rows v and columns u."""
+    terms = np.broadcast_arrays(np.ones((1, 1)), u[None, :], v[:, None])
+    one, u, v = terms
+    return np.stack([one, u, v, u * u, u * v, v * v], axis=-1)
+
+
+def _level(terms: np.ndarray, v: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Evaluate a quadratic without its six terms in memory."""
+    a, b, c, d, e, f = terms
+    return (
+        (a + b * u + d * u * u)[None, :] + (c * v + f * v * v)[:, None] + np.outer(v, e * u)
+    )
+
+
 def _fit_levels(
-    grey: np.ndarray, smooth: np.ndarray, threshold: np.ndarray
+    grey: np.ndarray,
+    smooth: np.ndarray,
+    threshold: np.ndarray,
+    basis: np.ndarray,
+    rim: float,
 ) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """Return dark level, bright level and explained variance from a first threshold."""
-    rows, columns = grey.shape
-    step = max(1, int(np.sqrt(grey.size / 60_000)))
-    sample = np.s_[step // 2 :: step, step // 2 :: step]
-    v, u = np.mgrid[-1 : 1 : rows * 1j, -1 : 1 : columns * 1j]
-    basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=-1)
+    """Return terms of the dark and the bright level, and how much they explain."""
+    terms = [np.zeros(basis.shape[-1])] * 2
     dark = bright = np.zeros_like(grey)
     previous = None
     for _ in range(12):
         mask = smooth > threshold
         # Pixels near the border are a mixture of both classes
-        inside = ndimage.gaussian_filter(mask.astype(np.float32), 3.0, truncate=2.0)[sample]
+        inside = ndimage.gaussian_filter(mask.astype(float), max(rim, 0.7), truncate=2.0)
         classes = [inside < 0.02, inside > 0.98]
         if min(np.count_nonzero(c) for c in classes) < 30:
             return None
-        dark, bright = (
-            basis @ _robust_fit(basis[sample][c], grey[sample][c]) for c in classes
-        )
+        terms = [_robust_fit(basis[c], grey[c]) for c in classes]
+        dark, bright = (basis @ level for level in terms)
         if (bright - dark).min() < 0.1 * (bright - dark).mean() or (bright <= dark).any():
             return None
         threshold = (dark + bright) / 2
-        if previous is not None and np.mean(mask != previous) < 1e-5:
+        if previous is not None and not np.any(mask != previous):
             break
         previous = mask
     model = np.where(smooth > threshold, bright, dark)
-    explained = 1 - np.mean((smooth - model)[sample] ** 2) / np.var(smooth[sample])
-    return dark, bright, float(explained)
+    explained = 1 - np.mean((smooth - model) ** 2) / np.var(smooth)
+    return terms[0], terms[1], float(explained)
 
 
 def _robust_fit(basis: np.ndarray, values: np.ndarray) -> np.ndarray:

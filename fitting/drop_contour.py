@@ -43,19 +43,22 @@ def find_drop(grey: np.ndarray, baseline: np.ndarray | None) -> DropContour | No
     from skimage.filters import threshold_otsu
     from skimage.measure import find_contours
 
-    first = ndimage.gaussian_filter(grey, 1.0)
-    if np.ptp(first) < 0.02:
+    step = max(1, min(grey.shape) // 800)
+    few = grey[::step, ::step]
+    if np.ptp(few) < 0.02:
         return None
-    level = threshold_otsu(first)
-    bright = first > level
-    level = (np.median(first[bright]) + np.median(first[~bright])) / 2
-    contrast = np.median(first[bright]) - np.median(first[~bright])
+    bright = ndimage.gaussian_filter(few, 1.0) > threshold_otsu(few)
+    if bright.all() or not bright.any():
+        return None
+    low, high = np.median(few[~bright]), np.median(few[bright])
+    contrast, level = high - low, (low + high) / 2
     if contrast < 0.02:
         return None
-    rows, columns = np.flatnonzero(bright.any(axis=1)), np.flatnonzero(bright.any(axis=0))
     # A lamp may light only a part of a large picture
-    top, left = max(rows[0] - 20, 0), max(columns[0] - 20, 0)
-    part = first[top : rows[-1] + 20, left : columns[-1] + 20]
+    rows, columns = (np.flatnonzero(bright.any(axis=axis)) * step for axis in (1, 0))
+    top, left = max(rows[0] - 20 - step, 0), max(columns[0] - 20 - step, 0)
+    part = grey[top : rows[-1] + 20 + step, left : columns[-1] + 20 + step]
+    part = ndimage.gaussian_filter(part, 1.0)
     down, right = np.gradient(part)
     drops = []
     for contour in find_contours(part, level):
