@@ -1,14 +1,21 @@
-"""Polarised reflectance (4 x 4 Mueller BRDF) of real rough surfaces."""
+"""Polarised reflectance (4 x 4 Mueller BRDF) of real rough surfaces.
+
+Public names load on first use: importing the package does no work.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pbrdf import materials
+    from pbrdf.analytic import MicrofacetModel
+    from pbrdf.errors import AccuracyWarning, DataFileError
+    from pbrdf.optics.materials import Material
+    from pbrdf.scene import Scene, load_scene
+    from pbrdf.simulation import simulate
+    from pbrdf.surface import GaussianSurface, HeightMap
 
 __version__ = "0.1.0"
-
-from pbrdf import materials
-from pbrdf.analytic import MicrofacetModel
-from pbrdf.errors import AccuracyWarning, DataFileError
-from pbrdf.optics.materials import Material
-from pbrdf.scene import Scene, load_scene
-from pbrdf.simulate import simulate
-from pbrdf.surface import GaussianSurface, HeightMap
 
 __all__ = [
     "AccuracyWarning",
@@ -22,3 +29,30 @@ __all__ = [
     "materials",
     "simulate",
 ]
+
+_HOME = {
+    "AccuracyWarning": "pbrdf.errors",
+    "DataFileError": "pbrdf.errors",
+    "GaussianSurface": "pbrdf.surface",
+    "HeightMap": "pbrdf.surface",
+    "Material": "pbrdf.optics.materials",
+    "MicrofacetModel": "pbrdf.analytic",
+    "Scene": "pbrdf.scene",
+    "load_scene": "pbrdf.scene",
+    "simulate": "pbrdf.simulation",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "materials":
+        return import_module("pbrdf.materials")
+    if name not in _HOME:
+        msg = f"module {__name__!r} has no attribute {name!r}"
+        raise AttributeError(msg)
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

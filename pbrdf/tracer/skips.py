@@ -52,8 +52,8 @@ def explanation(plan: Plan, *, periodic: bool, steepest: float) -> list[str]:
             )
         if "steep" in plan.skips:
             lines.append(
-                f"Rays rising above a slope of {steepest:.3g} (the steepest facet of the first "
-                "sample): not traced."
+                "Rays rising above the steepest facet of the first sample, a slope of "
+                f"{steepest:.3g}: not traced."
             )
     else:
         lines.append("Nothing skipped: Embree traces every ray.")
