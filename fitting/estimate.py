@@ -9,6 +9,8 @@ from scipy import special
 LEVEL = 0.95
 # An rms from less than this many independent values is anyone's guess
 _LEAST_FREEDOM = 0.5
+# and a length known no better than to a factor of e^(1.96 * 1.5) = 19 likewise
+_WIDEST = 1.5
 _NORMAL = float(special.ndtri(0.5 + LEVEL / 2))
 
 
@@ -109,6 +111,8 @@ class Estimate:
             Variance of its logarithm.
         """
         spread = np.sqrt(log_variance)
+        if spread > _WIDEST:
+            return cls.undetermined(value)
         factor = np.exp(_NORMAL * spread)
         return cls(
             float(value),

@@ -3,11 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy import special
 
 from fitting.estimate import Estimate
 from fitting.statistics_fit import AxisData, AxisFit, fit_axis
 from fitting.statistics_result import Autocorrelation, AxisStatistics
 from fitting.statistics_spectrum import measured_cutoff
+from fitting.statistics_variance import mean_power_of_correlation
 
 Array = np.ndarray
 
@@ -35,6 +37,14 @@ def axis_statistics(
     # Beyond chance, what the form does not describe widens the intervals
     freedom = max(fit.increments.lags.size - fit.parameters.size, 1)
     inflation = max(1.0, fit.misfit / freedom)
+    # The intervals' own widths come from as few independent pieces as the values
+    pieces = (
+        1
+        / fit.extent.across
+        / mean_power_of_correlation(fit.correlation, fit.extent.length, 2)
+    )
+    freedom = max(pieces - data.n_terms, 3.0)
+    student = (special.stdtrit(freedom, 0.975) / special.ndtri(0.975)) ** 2
     sampling = data.sampling
     disturbance = fit.noise + data.step**2 / 12
     cutoff = measured_cutoff(
@@ -48,9 +58,11 @@ def axis_statistics(
     length_variance = fit.log_variance(lambda t: fit.correlation_at(t).corr_length)
     return AxisStatistics(
         axis=name,
-        corr_length=_unbiased(fit.correlation.corr_length, inflation * length_variance),
-        slope_rms=_derivative_rms(fit, band, 1, inflation),
-        curvature_rms=_derivative_rms(fit, band, 2, inflation),
+        corr_length=_unbiased(
+            fit.correlation.corr_length, student * inflation * length_variance
+        ),
+        slope_rms=_derivative_rms(fit, band, 1, inflation * (1 + 1 / freedom)),
+        curvature_rms=_derivative_rms(fit, band, 2, inflation * (1 + 1 / freedom)),
         cutoff=cutoff,
         autocorrelation=_describe(fit, data),
         spacing=float(sampling.spacing),
@@ -102,15 +114,18 @@ def _describe(fit: AxisFit, data: AxisData) -> Autocorrelation:
 
 
 def height_rms(fits: list[AxisFit], step: float) -> Estimate:
-    """Root mean square of the true heights, from their mean square, not from the form."""
-    squares, variances = [], []
+    """Root mean square of the true heights, from their mean square, not from the form.
+
+    Of the two axes of a map the one that knows better what form removal took is used: along
+    grooves it cannot be told from the heights.
+    """
+    found = []
     for fit in fits:
         left = fit.mean_square - fit.noise - step**2 / 12
-        squares.append(max(left, 1e-3 * fit.mean_square) / (1 - fit.loss))
-        variances.append(_height_log_variance(fit, squares[-1], fit.loss))
-    return Estimate.root_mean_square(
-        float(np.sqrt(np.mean(squares))), float(np.mean(variances))
-    )
+        square = max(left, 1e-3 * fit.mean_square) / (1 - fit.loss)
+        found.append((_height_log_variance(fit, square, fit.loss), square))
+    variance, square = min(found)
+    return Estimate.root_mean_square(float(np.sqrt(square)), variance)
 
 
 def _height_log_variance(fit: AxisFit, square: float, loss: float) -> float:

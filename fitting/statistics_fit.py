@@ -40,6 +40,8 @@ _WIDE_LAGS = 24
 _HOPELESS = 60.0
 # What a sum of scales need not describe better, as a share of each increment
 _TOLERANCE = 0.01
+# Shortest length that spacing can tell from noise, in steps
+_SHORTEST = 0.7
 # Share of each standard deviation added to the diagonal of the covariance
 _SOFTENING = 0.3
 # Drop of the misfit, in chi-squared units, that a form with more parameters must bring
@@ -157,6 +159,9 @@ def fit_axis(
         Shares that the form's terms take across the axis, for a map.
     """
     problem = _Problem(data, across, losses_across)
+    if data.step**2 > data.sampling.variance:
+        # Lost in the rounding, the form cannot be told
+        families = families[:1]
     best = problem.solve(families[0], problem.pilot())
     for family in families[1:]:
         # No form can drop the misfit by more than all of it
@@ -247,6 +252,8 @@ class _Problem:
         system = self.factor @ np.column_stack([columns, noise])
         weights = optimize.nnls(system, self.factor @ observed)[0]
         used = weights[:-1] > 1e-4 * weights[:-1].sum()
+        if used.sum() < 2:
+            return reference
         lengths, shares = lengths[used], weights[:-1][used]
         family = multi_scale_family(lengths, shares / shares.sum())
         start = _Start(
@@ -259,18 +266,18 @@ class _Problem:
         length = float(np.clip(correlation.corr_length, 0, self.extent.length / 3))
         self.found = data.sampling.increments(self.reach * length, self.n_lags)
         lags = self.found.lags
-        self.rounding = Rounding.of_form(
-            data.step, data.form_increments(lags) if data.step > 0 else np.zeros((1, 0))
-        )
+        true = 2 * at.variance * (1 - correlation.rho(lags)) + 2 * at.noise
+        form_increments = data.form_increments(lags) if data.step > 0 else np.zeros((1, 0))
+        # A quarter leaves room for what the fit may still find
+        self.rounding = Rounding.of_form(data.step, form_increments, true.min() / 4)
         covariance = increment_covariance(
             lags,
             correlation,
             (at.variance, at.noise + self.rounding.variance),
             self.extent,
         )
-        true = 2 * at.variance * (1 - correlation.rho(lags)) + 2 * at.noise
         gain = np.concatenate([[1.0], self.rounding.gain(true)])
-        # Rounding noise is white in the covariance, so its own gain is in there already
+        # Taking the rounding noise along allows for its own correlation along a step
         self.covariance = covariance * np.outer(gain, gain) if data.step > 0 else covariance
         observed = np.concatenate([[self.mean_square], self.found.mean_square])
         # An error of the form is common to neighbouring lags, as a stretch of the curve is
@@ -279,8 +286,11 @@ class _Problem:
         self.covariance = self.covariance + alike * self.tolerance**2 * np.outer(
             observed, observed
         )
-        softened = self.covariance + np.diag(_SOFTENING**2 * np.diag(self.covariance))
-        self.factor = np.linalg.cholesky(np.linalg.inv(softened)).T
+        # Increments span many decades, and those along a groove are none at all
+        scale = np.sqrt(np.diag(self.covariance) + (1e-12 * self.mean_square) ** 2)
+        spread, axes = np.linalg.eigh(self.covariance / np.outer(scale, scale))
+        soft = np.sqrt(np.maximum(spread, 0.0) + _SOFTENING**2)
+        self.factor = (axes / soft).T / scale
 
     def model(self, family: Family, parameters: Array) -> Array:
         """Return the expected mean square height and increments. [um²]"""
@@ -306,7 +316,10 @@ class _Problem:
         self, family: Family, start: "_Start | AxisFit", starts: list[list[float]] | None
     ) -> AxisFit:
         length = start.correlation.corr_length
-        low, high = family.limits(length)
+        # Shorter than the spacing, roughness is noise
+        shortest = _SHORTEST * self.data.sampling.spacing
+        length = max(length, shortest)
+        low, high = family.limits(length, shortest)
         observed = np.concatenate([[self.mean_square], self.found.mean_square])
         noise = np.clip(start.noise / self.mean_square, 1e-6, 0.9)
         lower = np.array([np.log(self.mean_square * 1e-6), *low, 0.0])

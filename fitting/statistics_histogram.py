@@ -40,7 +40,8 @@ class Histogram:
     def gaussian(self, at: Array | None = None) -> Array:
         """Density of the Gaussian at the bin centres, or where asked."""
         x = self.centres if at is None else np.asarray(at)
-        return np.exp(-0.5 * (x / self.rms) ** 2) / (self.rms * np.sqrt(2 * np.pi))
+        rms = max(self.rms, 1e-12)
+        return np.exp(-0.5 * (x / rms) ** 2) / (rms * np.sqrt(2 * np.pi))
 
 
 def make_histogram(
@@ -55,7 +56,8 @@ def make_histogram(
     """Bin centred values; bins hold whole steps of a lattice the values may lie on."""
     known = values[np.isfinite(values)].ravel()
     known = known - known.mean()
-    reach = float(np.abs(known).max())
+    # A direction in which nothing varies still has a histogram, of one bar
+    reach = max(float(np.abs(known).max()), 1e-12)
     n = int(np.clip(2 * known.size ** (1 / 3), 15, 121)) | 1
     width = 2 * reach / n
     if lattice > 0:

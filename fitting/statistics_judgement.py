@@ -113,10 +113,17 @@ def _length(found: Findings) -> list[str]:
             f"only {np.prod(lengths):.1f} correlation lengths: form removal and chance "
             "decide height_rms and corr_length; intervals are rough"
         )
-    if found.slope.stderr > 0.3 * found.slope.value:
-        texts.append(
-            f"slope_rms is known to {found.slope.stderr / found.slope.value:.0%} only"
-        )
+    for axis, length in zip(found.axes, lengths, strict=True):
+        if length < 3:
+            texts.append(
+                f"along {axis.axis} the heights are correlated over the whole "
+                f"{axis.length:.3g} um: corr_length there is a guess"
+            )
+    error = found.slope.stderr / max(found.slope.value, 1e-300)
+    if not np.isfinite(error):
+        texts.append("slope_rms is not determined by these data")
+    elif error > 0.3:
+        texts.append(f"slope_rms is known to {error:.0%} only")
     return texts
 
 

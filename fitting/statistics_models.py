@@ -96,13 +96,14 @@ class Correlation:
 class Family:
     """How a form is parametrised for the fit: logarithms, with start and limits.
 
-    `build` takes the parameter vector, `start` and `limits` a first guess of corr_length.
+    `build` takes the parameter vector, `starts` a first guess of corr_length, `limits` that
+    and the shortest length that the spacing resolves.
     """
 
     form: str
     build: Callable[[Array], Correlation]
     starts: Callable[[float], list[list[float]]]
-    limits: Callable[[float], tuple[list[float], list[float]]]
+    limits: Callable[[float, float], tuple[list[float], list[float]]]
 
 
 def gaussian(corr_length: float) -> Correlation:
@@ -226,7 +227,9 @@ def multi_scale_family(lengths: Array, shares: Array) -> Family:
         return multi_scale(lengths, weights / weights.sum())
 
     limits = ([v - 5 for v in start], [v + 5 for v in start])
-    return Family("multi-scale", build, lambda _: [start], lambda _: limits)
+    return Family(
+        "multi-scale", build, lambda _: [start], lambda _length, _shortest: limits
+    )
 
 
 def _matern_unit(x: Array, nu: float) -> Array:
@@ -246,15 +249,15 @@ GAUSSIAN = Family(
     "gaussian",
     lambda p: gaussian(np.exp(p[0])),
     lambda length: [[np.log(length)]],
-    lambda length: ([np.log(length / 30)], [np.log(length * 30)]),
+    lambda length, shortest: ([np.log(max(length / 30, shortest))], [np.log(length * 30)]),
 )
 
 MATERN = Family(
     "matern",
     lambda p: matern(np.exp(p[0]), np.exp(p[1])),
     lambda length: [[np.log(length), np.log(0.6)], [np.log(length), np.log(2.5)]],
-    lambda length: (
-        [np.log(length / 30), np.log(SMOOTHNESS_RANGE[0])],
+    lambda length, shortest: (
+        [np.log(max(length / 30, shortest)), np.log(SMOOTHNESS_RANGE[0])],
         [np.log(length * 30), np.log(SMOOTHNESS_RANGE[1])],
     ),
 )
@@ -264,7 +267,7 @@ PERIODIC = Family(
     lambda p: periodic(np.exp(p[0]), np.exp(p[1])),
     # cos falls to 1/e at 0.19 periods
     lambda length: [[np.log(5.25 * length), np.log(k * length)] for k in (3.0, 15.0)],
-    lambda length: (
+    lambda length, _: (
         [np.log(2 * length), np.log(0.7 * length)],
         [np.log(100 * length), np.log(60 * length)],
     ),
@@ -275,8 +278,8 @@ TWO_SCALE = Family(
     # Long length, ratio of the lengths, logit of the share
     lambda p: two_scale(np.exp(p[0]), np.exp(p[0] - p[1]), special.expit(p[2])),
     lambda length: [[np.log(1.2 * length), np.log(5.0), special.logit(0.15)]],
-    lambda length: (
-        [np.log(length / 5), np.log(1.5), special.logit(0.003)],
+    lambda length, shortest: (
+        [np.log(max(length / 5, shortest)), np.log(1.5), special.logit(0.003)],
         [np.log(length * 30), np.log(100.0), special.logit(0.9)],
     ),
 )

@@ -21,7 +21,7 @@ import numpy as np
 
 Array = np.ndarray
 
-N_HARMONICS = 200
+_MOST_HARMONICS = 200
 # A lattice shows in this many heights as well as in all of a large map
 _MOST_HEIGHTS = 200_000
 # Steps this far below the rms increment change nothing that is printed
@@ -68,7 +68,7 @@ class Rounding:
     ----------
     step : float
         Lattice step q. [um]; 0 for heights that are not rounded.
-    cosines : ndarray, shape (N_HARMONICS, n_lags)
+    cosines : ndarray, shape (n_harmonics, n_lags)
         Mean of cos(2 π k μ / q) over the increments μ of the removed form.
     """
 
@@ -76,11 +76,22 @@ class Rounding:
     cosines: Array
 
     @classmethod
-    def of_form(cls, step: float, form_increments: Array) -> "Rounding":
-        """From increments of the removed form, shape (n_samples, n_lags). [um]"""
+    def of_form(cls, step: float, form_increments: Array, smallest: float) -> "Rounding":
+        """From increments of the removed form and the smallest mean square increment.
+
+        Parameters
+        ----------
+        step : float
+            [um]
+        form_increments : ndarray, shape (n_samples, n_lags)
+            [um]
+        smallest : float
+            Decides how many harmonics count: the last has decayed to exp(-8 pi²). [um²]
+        """
         if step <= 0:
-            return cls(0.0, np.zeros((N_HARMONICS, 0)))
-        k = np.arange(1, N_HARMONICS + 1)[:, None, None]
+            return cls(0.0, np.zeros((0, 0)))
+        n = int(np.clip(2 * step / np.sqrt(max(smallest, 1e-300)), 8, _MOST_HARMONICS))
+        k = np.arange(1, n + 1)[:, None, None]
         return cls(step, np.cos(2 * np.pi * k * form_increments / step).mean(axis=1))
 
     def increments(self, mean_square: Array) -> Array:
@@ -99,7 +110,7 @@ class Rounding:
         return 1 + 2 * np.sum(self.cosines * decay, axis=0)
 
     def _harmonics(self, mean_square: Array) -> tuple[Array, Array]:
-        k = np.arange(1, N_HARMONICS + 1)[:, None]
+        k = np.arange(1, len(self.cosines) + 1)[:, None]
         exponent = 2 * (np.pi * k / self.step) ** 2 * np.maximum(mean_square, 0)
         return k, np.exp(-exponent)
 

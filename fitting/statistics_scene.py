@@ -43,8 +43,8 @@ def measured_surface(
     """Surface with the fitted autocorrelation and, if it is not Gaussian, the histogram.
 
     The form of the autocorrelation is that of the steeper axis; its length is measured
-    along both. Noise and rounding are left out of it. The height distribution is that of the
-    residual heights, so it keeps what little shape noise adds.
+    along both. Noise and rounding are left out of it. The height distribution is that of
+    the residual heights, so it keeps what little shape noise adds.
     """
     from pbrdf.surface.measured import MeasuredSurface
 

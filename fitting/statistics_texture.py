@@ -112,7 +112,7 @@ def _ratio(size: float) -> float:
 
 def _p_value(deviator: Array, scatter: Array, n: int) -> float:
     """Hotelling's test that the deviator is zero."""
-    squared = float(deviator @ np.linalg.solve(scatter, deviator))
+    squared = float(deviator @ np.linalg.solve(scatter + 1e-12 * np.eye(2), deviator))
     return float(special.fdtrc(2, n - 2, squared * (n - 2) / (2 * (n - 1))))
 
 

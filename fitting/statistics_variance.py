@@ -23,6 +23,7 @@ Array = np.ndarray
 
 # Nodes a correlation length in the integrals over the separation m
 _NODES = 12
+_MOST_NODES = 1500
 
 
 @dataclass(frozen=True)
@@ -71,8 +72,8 @@ def increment_covariance(
     """
     height, noise = variances
     rho = correlation.rho
-    step = correlation.corr_length / _NODES
     reach = min(5 * correlation.longest_length() + lags[-1], extent.length)
+    step = max(correlation.corr_length / _NODES, reach / _MOST_NODES)
     m = np.arange(-np.ceil(reach / step), np.ceil(reach / step) + 1) * step
     weight = np.clip(1 - np.abs(m) / extent.length, 0, None)
     weight *= 2 * step / extent.length * extent.across

@@ -70,7 +70,7 @@ def test_rounded_increments_match_brute_force(tilt, rms_increment):
     increment = rng.normal(scale=rms_increment, size=n)
     rounded = step * np.round((start + increment + tilt) / step)
     squared = (rounded - step * np.round(start / step) - tilt) ** 2
-    rounding = Rounding.of_form(step, np.full((3, 1), tilt))
+    rounding = Rounding.of_form(step, np.full((3, 1), tilt), rms_increment**2)
     expected = rounding.increments(np.array([rms_increment**2]))[0]
     assert abs(squared.mean() - expected) < 4 * squared.std() / np.sqrt(n)
     # Its derivative, by finite differences
@@ -136,6 +136,14 @@ def test_form_removal_takes_the_expected_share(degree, length):
     expected = 1 - form_scatter(gaussian(14.0), length, degree)
     # A ratio of two variances from 600 draws that share most of their chance
     assert_allclose(np.var(left) / np.var(scatter), expected, atol=0.15)
+
+
+@pytest.mark.parametrize("length", [150.0, 700.0, 3000.0])
+def test_share_of_the_mean_in_closed_form(length):
+    # (2/L) int_0^L (1 - r/L) exp(-r²/l²) dr
+    u = length / 14.0
+    exact = np.sqrt(np.pi) * special.erf(u) / u - (1 - np.exp(-(u**2))) / u**2
+    assert_allclose(form_losses(gaussian(14.0), length, 0), [exact], rtol=1e-3)
 
 
 def test_form_removal_is_exact_for_polynomials():
