@@ -65,8 +65,11 @@ lint: .venv/.dev
 bench: .venv/.all
 	$(BIN)/python -m pytest -m bench -s
 
-studies: .venv/.run
-	@set -e; for script in studies/*/run.py; do echo "== $$script"; $(BIN)/python $$script; done
+# One of them: make studies STUDY=real_coatings
+STUDY ?= *
+studies: .venv/.all
+	@set -e; for script in $$(grep -l __main__ studies/$(STUDY)/*.py); do \
+		echo "== $$script"; PYTHONPATH=. $(BIN)/python $$script; done
 
 docs: .venv/.dev
 	$(BIN)/mkdocs build --strict --quiet
