@@ -221,9 +221,8 @@ def _first_stderr(
     observations: Observations, weights: Weights, predicted: np.ndarray
 ) -> np.ndarray:
     """Return standard errors to begin with, from the measured M00 where there is one."""
-    m00 = np.full(observations.geometry.size, np.nan)
-    is_m00 = observations.name == "M00"
-    m00[observations.at[is_m00]] = np.abs(observations.value[is_m00])
-    typical = np.nanmedian(m00) if is_m00.any() else float(np.median(np.abs(predicted)))
+    m00 = np.abs(observations.m00)
+    read = np.isfinite(m00).any()
+    typical = np.nanmedian(m00) if read else float(np.median(np.abs(predicted)))
     m00 = np.where(m00 > 0.0, m00, typical)
-    return weights.shape(np.maximum(m00, 1e-3 * typical)[observations.at])
+    return weights.shape(np.maximum(m00, 1e-3 * typical))

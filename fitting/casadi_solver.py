@@ -12,7 +12,7 @@ from fitting.solution import Solution, better, early_end
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["solve_casadi"]
+__all__ = ["refine_casadi", "solve_casadi"]
 
 _SOLVERS: "WeakKeyDictionary[Prediction, dict[str, casadi.Function]]" = WeakKeyDictionary()
 
@@ -42,7 +42,9 @@ _STATUS = {
 }
 
 
-def solve_casadi(objective: Objective, *, max_iterations: int = 500) -> Solution:
+def solve_casadi(
+    objective: Objective, *, max_iterations: int = 500, passes: int = 8
+) -> Solution:
     """Return the minimum nearest to the start, inside the bounds.
 
     A curve that is linear in its parameters is solved exactly as a bounded quadratic
@@ -56,6 +58,8 @@ def solve_casadi(objective: Objective, *, max_iterations: int = 500) -> Solution
         The problem.
     max_iterations : int
         IPOPT iterations in each pass.
+    passes : int
+        Limit of the restarts.
 
     Returns
     -------
@@ -71,72 +75,97 @@ def solve_casadi(objective: Objective, *, max_iterations: int = 500) -> Solution
         return ended
     if objective.prediction.is_linear and objective.loss == "linear":
         return _solve_linear(objective)
-    return _solve_ipopt(objective, max_iterations)
+    return _solve_ipopt(objective, max_iterations, passes)
 
 
-def _solve_ipopt(objective: Objective, max_iterations: int) -> Solution:
-    """Run IPOPT in units of the parameters' size, then of the steps that matter."""
-    solver = _ipopt(objective, max_iterations)
-    start = objective.start
+def refine_casadi(objective: Objective) -> Solution:
+    """Return the minimum next to a start that is nearly one, with little patience."""
+    return solve_casadi(objective, passes=3)
+
+
+def _solve_ipopt(objective: Objective, max_iterations: int, passes: int) -> Solution:
+    """Run IPOPT in units of the parameters' size, then of the steps that matter.
+
+    Where the exact Hessian leads nowhere better, the Gauss-Newton one, which never bends
+    the wrong way, gets a try before the search ends.
+    """
+    start, exact = objective.start, objective.prediction.second_order
     best = Solution(
         x=start,
         cost=objective.cost(start),
         converged=False,
-        status="not started",
+        status="stopped: no step reduced the cost",
         solver="casadi/ipopt",
         n_evaluations=0,
     )
-    scale = objective.sizes(start)
-    count = 0
-    for attempt in range(8):
-        norm = best.cost if best.cost > 0.0 else 1.0
-        answer = solver(
-            x0=best.x / scale,
-            p=np.concatenate([objective.numbers, scale, [norm]]),
-            lbx=objective.low / scale,
-            ubx=objective.high / scale,
-        )
-        stats = solver.stats()
-        count += stats.get("n_call_nlp_f", 0)
-        x = np.clip(answer["x"].full().ravel() * scale, objective.low, objective.high)
-        previous = best
-        if np.isfinite(x).all():
-            x = _snapped(objective, x, scale)
-            status = _STATUS.get(
-                stats["return_status"], f"stopped: {stats['return_status']}"
-            )
-            found = replace(
-                best,
-                x=x,
-                cost=objective.cost(x),
-                converged=status.startswith("converged"),
-                status=status,
-            )
-            best = better(found, best)
-        stuck = attempt > 0 and best.cost >= previous.cost * (1.0 - 1e-10)
-        if stuck or objective.is_at_rest(best.x):
+    scale, count, gauss_newton = objective.sizes(start), 0, not exact
+    for attempt in range(passes):
+        solver = _ipopt(objective, max_iterations, gauss_newton=gauss_newton)
+        found, evaluations = _pass(objective, solver, best, scale)
+        count += evaluations
+        previous, best = best, better(found, best)
+        if objective.is_at_rest(best.x):
             break
+        if attempt > 0 and best.cost >= previous.cost * (1.0 - 1e-10):
+            if gauss_newton:
+                break
+            gauss_newton = True
         scale = objective.step_sizes(best.x)
     if not best.converged and objective.is_at_rest(best.x):
         best = replace(best, converged=True, status="converged to rounding error")
     return replace(best, n_evaluations=count)
 
 
-def _snapped(objective: Objective, x: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Put a parameter on the bound it presses against; IPOPT stops a hair inside it."""
-    _, gradient = objective.cost_gradient(x)
-    on_low = (x - objective.low < 1e-6 * scale) & (gradient > 0.0)
-    on_high = (objective.high - x < 1e-6 * scale) & (gradient < 0.0)
-    snapped = np.where(on_low, objective.low, np.where(on_high, objective.high, x))
-    return snapped if objective.cost(snapped) <= objective.cost(x) else x
+def _pass(
+    objective: Objective, solver: "casadi.Function", begin: Solution, scale: np.ndarray
+) -> tuple[Solution, int]:
+    """Run IPOPT once from `begin` and return where it ended, and how often it looked."""
+    norm = begin.cost if begin.cost > 0.0 else 1.0
+    answer = solver(
+        x0=begin.x / scale,
+        p=np.concatenate([objective.numbers, scale, [norm]]),
+        lbx=objective.low / scale,
+        ubx=objective.high / scale,
+    )
+    stats = solver.stats()
+    count = stats.get("n_call_nlp_f", 0)
+    x = np.clip(answer["x"].full().ravel() * scale, objective.low, objective.high)
+    if not np.isfinite(x).all():
+        return begin, count
+    x = _snapped(objective, x)
+    word = stats["return_status"]
+    status = _STATUS.get(word, f"stopped: {word}")
+    converged = status.startswith("converged")
+    cost = objective.cost(x)
+    return replace(begin, x=x, cost=cost, converged=converged, status=status), count
 
 
-def _ipopt(objective: Objective, max_iterations: int) -> "casadi.Function":
+def _snapped(objective: Objective, x: np.ndarray) -> np.ndarray:
+    """Put parameters on the bounds they are next to, if the cost does not notice.
+
+    IPOPT stops a hair inside a bound it is pressed against, and further inside where the
+    cost is flat, as it is in kappa near 0.
+    """
+    near = 1e-4 * np.array([parameter.scale for parameter in objective.parameters])
+    cost = objective.cost(x)
+    for i in range(len(x)):
+        for bound in (objective.low[i], objective.high[i]):
+            if 0.0 < abs(x[i] - bound) < near[i]:
+                there = x.copy()
+                there[i] = bound
+                if objective.cost(there) <= cost * (1.0 + 1e-12):
+                    x = there
+    return x
+
+
+def _ipopt(
+    objective: Objective, max_iterations: int, *, gauss_newton: bool
+) -> "casadi.Function":
     """Return the IPOPT solver of this curve and loss, built at the first use."""
     import casadi
 
     cache = _SOLVERS.setdefault(objective.prediction, {})
-    key = f"{objective.loss} {max_iterations}"
+    key = f"{objective.loss} {max_iterations} {gauss_newton}"
     if key not in cache:
         expressions = objective.expressions
         n = expressions.x.numel()
@@ -144,7 +173,7 @@ def _ipopt(objective: Objective, max_iterations: int) -> "casadi.Function":
         cost = casadi.substitute(expressions.cost, expressions.x, u * scale)
         p = casadi.vertcat(expressions.p, scale, norm)
         options: dict[str, Any] = {**_IPOPT_OPTIONS, "ipopt.max_iter": max_iterations}
-        if not objective.prediction.second_order:
+        if gauss_newton:
             weight, none = casadi.MX.sym("w"), casadi.MX.sym("g", 0)
             curvature = casadi.substitute(
                 expressions.gauss_newton, expressions.x, u * scale

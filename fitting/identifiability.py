@@ -74,14 +74,18 @@ def misfit_warnings(problem: Problem, solved: Solved, p_value: float) -> list[st
         warnings.append(
             f"chi2/dof is {ratio:.3g}: the stated errors are larger than the scatter"
         )
-    for name, correlation, count in _runs(problem.observations, residual):
-        # Independent residuals have a lag-one correlation of 0 +- 1/sqrt(count)
-        if count >= 12 and correlation > max(0.4, 4.0 / np.sqrt(count)):
-            warnings.append(
-                f"the residuals of {name} run together along the scan (correlation of "
-                f"neighbours {correlation:.2f}): a misfit of the model, not noise, so the "
-                "standard errors are too small"
-            )
+    # Independent residuals have a lag-one correlation of 0 +- 1/sqrt(count)
+    running = [
+        f"{name} ({correlation:.2f})"
+        for name, correlation, count in _runs(problem.observations, residual)
+        if count >= 12 and correlation > max(0.4, 4.0 / np.sqrt(count))
+    ]
+    if running:
+        warnings.append(
+            f"the residuals of {_listed(running)} run together along the scan (correlation "
+            "of neighbours): a misfit of the model, not noise, so the standard errors are "
+            "too small"
+        )
     return warnings
 
 

@@ -161,11 +161,8 @@ def _groups(observations: Observations, known: np.ndarray) -> np.ndarray:
 def _of_file(observations: Observations) -> Weights:
     """Take the standard errors of the file, or the percentage of M00 that they are."""
     nobody = np.full(len(observations.value), -1)
-    m00 = np.full(observations.geometry.size, np.nan)
-    is_m00 = observations.name == "M00"
-    m00[observations.at[is_m00]] = np.abs(observations.value[is_m00])
     with np.errstate(divide="ignore"):
-        ratio = observations.stderr / m00[observations.at]
+        ratio = observations.stderr / np.abs(observations.m00)
     part = np.full(len(ratio), np.nan)
     for name in observations.names:
         members = observations.name == name

@@ -259,12 +259,17 @@ class Objective:
     def step_sizes(self, x: np.ndarray) -> np.ndarray:
         """Return the change of each parameter that alone changes the fit by its misfit.
 
-        Where a parameter has no effect, or the Jacobian is not finite, its own size.
+        Never more than the larger of its own size and its natural scale: at kappa = 0 the
+        effect vanishes, and a step of equal effect would have no end.
         """
         with np.errstate(all="ignore"):
             curvature = np.linalg.norm(self.jacobian(x), axis=0)
             step = np.sqrt(2.0 * self.cost(x)) / curvature
-        return np.where(np.isfinite(step) & (step > 0.0), step, self.sizes(x))
+        natural = [parameter.scale for parameter in self.parameters]
+        largest = np.maximum(np.abs(x), natural)
+        return np.where(
+            np.isfinite(step) & (step > 0.0), np.minimum(step, largest), largest
+        )
 
     def whitening(self, x: np.ndarray) -> np.ndarray:
         """Return T, shape (n, n), with T^T J^T J T = 2 cost(x): steps of equal effect.

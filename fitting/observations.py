@@ -96,6 +96,14 @@ class Observations:
         return tuple(dict.fromkeys(self.name.tolist()))
 
     @property
+    def m00(self) -> np.ndarray:
+        """The M00 read at the geometry of each reading, nan where it was not, (m,)."""
+        there = np.full(self.geometry.size, np.nan)
+        is_m00 = self.name == "M00"
+        there[self.at[is_m00]] = self.value[is_m00]
+        return there[self.at]
+
+    @property
     def has_polarisation(self) -> bool:
         """True if anything but M00 was measured."""
         return set(self.names) != {"M00"}

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fitting.aperture import Aperture
-from fitting.casadi_solver import solve_casadi
+from fitting.casadi_solver import refine_casadi, solve_casadi
 from fitting.forward import Layout, MuellerModel, predict
 from fitting.global_search import starts
 from fitting.nlopt_solver import refine_nlopt, solve_nlopt
@@ -29,12 +29,14 @@ SOLVERS: dict[str, Callable[[Objective], Solution]] = {
 
 # From a point that is nearly the minimum
 _REFINERS: dict[str, Callable[[Objective], Solution]] = {
-    "casadi": solve_casadi,
+    "casadi": refine_casadi,
     "nlopt": refine_nlopt,
 }
 
 # Rounds of estimating the noise and fitting again
 _ROUNDS = 25
+# Rounds before the changes are halved
+_UNDAMPED = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +154,9 @@ class Problem:
             if not changes or not solution.converged:
                 break
             previous, stderr = stderr, self._stderr(objective, solution, m00)
+            if attempt >= _UNDAMPED:
+                # A model far from the data can swing between two sets of weights
+                stderr = np.sqrt(previous * stderr)
             objective = objective.with_data(objective.data, stderr)
             objective = objective.started_at(solution.x)
             exact = stderr.max() <= 2.0 * _floor(objective)
@@ -183,6 +188,10 @@ class Problem:
         brightness = np.ones(len(objective.data))
         if m00 is not None:
             brightness = m00(solution.x).full().ravel()
+            # Far outside any noise the curve is wrong, and must not set its own weights
+            read = self.observations.m00
+            lit = read > 0.0
+            brightness[lit] = np.clip(brightness[lit], 0.5 * read[lit], 2.0 * read[lit])
         shape = self.weights.shape(brightness)
         # A reading where the model is dark still has some noise
         shape = np.maximum(shape, 1e-6 * np.median(shape))
