@@ -74,9 +74,10 @@ def test_overhang_is_the_mean_excess_of_slopes(law, slope):
         assert_allclose(actual, sum(pieces) / cot, rtol=2e-4, atol=1e-9)
 
 
-def test_anisotropic_overhang_sees_the_slope_along_the_ray():
-    model = MicrofacetModel(MIRROR, (0.1, 0.5))
-    steep = MicrofacetModel(MIRROR, 0.5)
+@pytest.mark.parametrize("law", ["gaussian", "exponential", "trowbridge-reitz"])
+def test_anisotropic_overhang_sees_the_slope_along_the_ray(law):
+    model = MicrofacetModel(MIRROR, (0.1, 0.5), law)
+    steep = MicrofacetModel(MIRROR, 0.5, law)
     bare = {m: m.with_parameters(shadowing="none") for m in (model, steep)}
     # In retro-reflection along y only the slope along y hides: same factor as isotropic 0.5
     factors = [
@@ -84,7 +85,7 @@ def test_anisotropic_overhang_sees_the_slope_along_the_ray():
         / bare[m].brdf(1.3, 1.3, 0.0, phi_i=np.pi / 2)[0, 0]
         for m in (model, steep)
     ]
-    assert_allclose(factors[0], factors[1], rtol=1e-12)
+    assert_allclose(factors[0], factors[1], rtol=1e-4 if law == "exponential" else 1e-12)
 
 
 def test_direction_correlation_counts_the_same_hiding_once():
