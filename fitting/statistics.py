@@ -1,14 +1,13 @@
 """Surface statistics that can be trusted: noise, rounding and finite length corrected."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol, TypeGuard
 
 import numpy as np
 
-from fitting.estimate import Estimate
-from fitting.statistics_axis import axis_statistics, height_rms
-from fitting.statistics_fit import AxisData, AxisFit, fit_axis
+from fitting.statistics_assembly import assemble
+from fitting.statistics_axis import axis_statistics
+from fitting.statistics_fit import AxisData
 from fitting.statistics_form import (
     FORMS,
     Form,
@@ -16,24 +15,15 @@ from fitting.statistics_form import (
     remove_form_map,
     remove_form_profile,
 )
-from fitting.statistics_gaussianity import judge_gaussianity
-from fitting.statistics_judgement import Findings, warnings_for
 from fitting.statistics_lags import Sampling, line_sampling, profile_sampling
 from fitting.statistics_models import GAUSSIAN
 from fitting.statistics_quantisation import find_step, is_negligible
-from fitting.statistics_result import (
-    AxisStatistics,
-    PlainStatistics,
-    SurfaceStatistics,
-)
-from fitting.statistics_texture import measure_anisotropy
+from fitting.statistics_result import SurfaceStatistics
+from fitting.statistics_solver import fit_axis
 from fitting.statistics_variance import form_losses, mean_power_of_correlation
 
 Array = np.ndarray
 
-# Estimates along x and y of one isotropic map share a third of their variance: the ratio of
-# the integrals of (d²ρ/dxdy)² and (d²ρ/dx²)² for a Gaussian autocorrelation
-_SHARED = 1 / 3
 _FEWEST_POINTS = 12
 
 
@@ -138,7 +128,7 @@ def _profile_statistics(
 
     data = AxisData(sampling, step, form_increments, degree, removed.n_terms)
     along = axis_statistics("x", data, 1.0, None)
-    return _assemble(
+    return assemble(
         "profile", (along,), residual, (sampling.spacing,), form=form, step=step
     )
 
@@ -166,7 +156,7 @@ def _map_statistics(
         across = mean_power_of_correlation(other, length, 2)
         losses = form_losses(other, length, degree)
         axes.append(axis_statistics(name, data[i], across, losses))
-    return _assemble("map", tuple(axes), residual, spacing, form=form, step=step)
+    return assemble("map", tuple(axes), residual, spacing, form=form, step=step)
 
 
 def _map_increments(removed: Form, axis: int) -> Callable[[Array], Array]:
@@ -181,121 +171,6 @@ def _map_increments(removed: Form, axis: int) -> Callable[[Array], Array]:
         return removed.along(axis, begin + lags, side) - removed.along(axis, begin, side)
 
     return increments
-
-
-@dataclass(frozen=True)
-class _Counts:
-    """Independent samples of a map or profile for powers of the autocorrelation."""
-
-    skewness: float
-    kurtosis: float
-
-
-def _independent(axes: tuple[AxisStatistics, ...]) -> _Counts:
-    share = [1.0, 1.0]
-    for axis in axes:
-        for i, power in enumerate((3, 4)):
-            share[i] *= mean_power_of_correlation(axis.fit.correlation, axis.length, power)
-    return _Counts(1 / share[0], 1 / share[1])
-
-
-def _assemble(
-    kind: str,
-    axes: tuple[AxisStatistics, ...],
-    residual: Array,
-    spacing: tuple[float, ...],
-    *,
-    form: str,
-    step: float,
-) -> SurfaceStatistics:
-    fits = [axis.fit for axis in axes]
-    height = height_rms(fits, step)
-    slope = _combine([axis.slope_rms for axis in axes], 2)
-    counts = _independent(axes)
-    sampling_slope = np.sqrt(
-        np.mean(
-            [a.fit.increments.mean_square[0] / a.fit.increments.lags[0] ** 2 for a in axes]
-        )
-    )
-    noise = _noise_rms(fits)
-    known = int(np.isfinite(residual).sum())
-    anisotropy = None
-    if kind == "map":
-        anisotropy = measure_anisotropy(
-            residual,
-            (spacing[0], spacing[1]),
-            min(a.corr_length.value for a in axes) / 5,
-            noise.value**2 + step**2 / 12,
-        )
-    findings = Findings(
-        kind=kind,
-        height=height,
-        slope=slope,
-        noise=noise,
-        axes=axes,
-        step=step,
-        raw_slope=float(sampling_slope),
-        gaussianity=judge_gaussianity(residual, counts.skewness, counts.kurtosis),
-        anisotropy=anisotropy,
-        missing=1 - known / residual.size,
-    )
-    warnings, reliable = warnings_for(findings)
-    if not reliable:
-        slope = Estimate.undetermined(slope.value)
-    return SurfaceStatistics(
-        kind=kind,
-        height_rms=height,
-        corr_length=_combine([axis.corr_length for axis in axes], 0),
-        slope_rms=slope,
-        noise_rms=noise,
-        curvature_rms=_combine([axis.curvature_rms for axis in axes], 2),
-        gaussianity=findings.gaussianity,
-        anisotropy=anisotropy,
-        axes=axes,
-        quantisation=step,
-        cutoff=max(axis.cutoff for axis in axes),
-        correlation_lengths=float(
-            np.prod([axis.length / axis.corr_length.value for axis in axes])
-        ),
-        n_points=known,
-        form=form,
-        plain=PlainStatistics(
-            height_rms=float(np.sqrt(fits[0].mean_square)),
-            corr_length=float(np.exp(np.mean([np.log(a.plain_corr_length) for a in axes]))),
-            slope_rms=float(sampling_slope),
-        ),
-        warnings=warnings,
-        reliable=reliable,
-        residual=residual,
-        spacing=spacing,
-    )
-
-
-def _combine(parts: list[Estimate], power: int) -> Estimate:
-    """Mean over the axes of a map: of squares (power 2), or geometric (power 0)."""
-    if len(parts) == 1:
-        return parts[0]
-    values = np.array([p.value for p in parts])
-    logs = np.array([p.stderr for p in parts]) / values
-    if power == 0:
-        share, value = np.full(2, 0.5), float(np.sqrt(np.prod(values)))
-    else:
-        share, value = values**2 / np.sum(values**2), float(np.sqrt(np.mean(values**2)))
-    shared = 2 * _SHARED * np.prod(share * logs)
-    variance = float(np.sum((share * logs) ** 2) + shared)
-    if power == 0:
-        return Estimate.positive(value, variance)
-    return Estimate.root_mean_square(value, 4 * variance)
-
-
-def _noise_rms(fits: list[AxisFit]) -> Estimate:
-    """Root of the mean noise variance; its interval reaches 0 where it may be none."""
-    variance = float(np.mean([fit.noise for fit in fits]))
-    stderr = float(np.mean([fit.noise_stderr for fit in fits]))
-    ends = [np.sqrt(max(variance + k * stderr, 0.0)) for k in (-1.96, 0, 1.96, 1)]
-    # d sqrt(v) = dv / (2 sqrt(v)) fails at v = 0, where the interval itself is the scale
-    spread = stderr / (2 * ends[1]) if variance > stderr else (ends[3] - ends[1])
-    return Estimate(float(ends[1]), float(spread), float(ends[0]), float(ends[2]))
 
 
 def _step(heights: Array, quantisation: float | None, sampling: Sampling) -> float:

@@ -6,8 +6,9 @@ import numpy as np
 from scipy import special
 
 from fitting.estimate import Estimate
-from fitting.statistics_fit import AxisData, AxisFit, fit_axis
-from fitting.statistics_result import Autocorrelation, AxisStatistics
+from fitting.statistics_fit import AxisData, AxisFit
+from fitting.statistics_parts import Autocorrelation, AxisStatistics
+from fitting.statistics_solver import fit_axis
 from fitting.statistics_spectrum import measured_cutoff
 from fitting.statistics_variance import mean_power_of_correlation
 
@@ -35,8 +36,8 @@ def axis_statistics(
     """
     fit = fit_axis(data, across=across, losses_across=losses)
     # Beyond chance, what the form does not describe widens the intervals
-    freedom = max(fit.increments.lags.size - fit.parameters.size, 1)
-    inflation = max(1.0, fit.misfit / freedom)
+    spare = max(fit.increments.lags.size - fit.parameters.size, 1)
+    inflation = max(1.0, fit.misfit / spare)
     # The intervals' own widths come from as few independent pieces as the values
     pieces = (
         1

@@ -6,7 +6,7 @@ import numpy as np
 
 from fitting.estimate import Estimate
 from fitting.statistics_gaussianity import Gaussianity
-from fitting.statistics_result import AxisStatistics
+from fitting.statistics_parts import AxisStatistics
 from fitting.statistics_texture import Anisotropy
 
 
@@ -45,7 +45,8 @@ def _rounding(found: Findings) -> list[str]:
         return []
     return [
         f"height step {found.step:.3g} um exceeds height_rms {found.height.value:.3g} um: "
-        "the heights are lost in the rounding and slope_rms cannot be recovered. "
+        "the heights are lost in the rounding, its correction fails and slope_rms cannot "
+        "be trusted. "
         "Measure with a finer height step."
     ]
 
