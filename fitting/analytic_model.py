@@ -75,7 +75,9 @@ class AnalyticModel:
     def updated(self, values: Mapping[str, float]) -> "MicrofacetModel":
         """Return the model with these values."""
         changes: dict[str, Any] = dict(values)
-        index = {name: changes.pop(name) for name in ("n", "kappa") if name in changes}
+        index: dict[str, Any] = {
+            name: changes.pop(name) for name in ("n", "kappa") if name in changes
+        }
         if "volume_albedo" in changes:
             # One base under the interface, under one name
             index["diffuse_albedo"] = 0.0
