@@ -79,7 +79,7 @@ def rays_through(geometry: Geometry, aperture: Aperture | None) -> Rays:
     --------
     >>> one = Geometry(*(np.array([v]) for v in (0.5, 0.3, 3.0, 0.0, np.nan)))
     >>> rays_through(one, Aperture(detector=0.02)).weight.round(3)
-    array([0.25 , 0.126, 0.125, 0.125, 0.124, 0.125, 0.125])
+    array([0.25 , 0.126, 0.126, 0.125, 0.124, 0.124, 0.125])
     """
     unity = np.broadcast_to(np.eye(4), (geometry.size, 4, 4))
     if aperture is None or (aperture.source == 0.0 and aperture.detector == 0.0):
