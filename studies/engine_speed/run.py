@@ -1,0 +1,229 @@
+"""Speed of the Monte Carlo engine, each figure as a ratio of two timings of one run."""
+
+import argparse
+import os
+import platform
+import resource
+import time
+import warnings
+
+import numpy as np
+from embreex.rtcore_scene import EmbreeScene  # noqa: F401  (loaded before any clock starts)
+from plain import simulate_plainly
+
+import pbrdf
+from pbrdf.tracer.embree import EmbreeField
+from pbrdf.tracer.plan import Plan
+from pbrdf.tracer.skips import SKIPS
+from pbrdf.tracer.trace import prepare, trace_sample
+
+SIZE = 512
+SLOPE = 0.30
+THETA = np.deg2rad(60.0)
+
+
+def surface(slope, size=SIZE):
+    """Surface of the benchmark: 16 cells a correlation length."""
+    return pbrdf.GaussianSurface(
+        shape=(size, size), spacing=1.0, corr_length=16.0, slope_rms=slope
+    )
+
+
+def plan(n_rays, *, theta=THETA, skips=frozenset(SKIPS), n=1.5, stokes=4):
+    """All wavelengths of a list n over one surface."""
+    index = np.atleast_1d(np.asarray(n, dtype=float))[:, None]
+    return Plan(
+        theta_i=np.array([theta]), phi_i=0.3, n_rays=n_rays, max_bounces=64, n=index,
+        kappa=np.zeros_like(index), base=np.empty((len(index), 0)), n_stokes=stokes,
+        n_theta=45, n_dphi=90, skips=skips,
+    )  # fmt: skip
+
+
+def seconds(work, repeats=3):
+    """CPU time of the fastest of some runs after a first."""
+    work()
+    best = np.inf
+    for _ in range(repeats):
+        start = time.process_time()
+        work()
+        best = min(best, time.process_time() - start)
+    return best
+
+
+def wall_seconds(work, repeats=3):
+    """Wall time of the fastest of some runs after a first."""
+    work()
+    best = np.inf
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        best = min(best, time.perf_counter() - start)
+    return best
+
+
+def against_embree(n_rays):
+    """Path segments through Embree: the engine against a replay of the very same rays."""
+    target = prepare(surface(SLOPE).sample(3), frozenset())
+    batches = []
+    plain_run = EmbreeField.first_faces
+
+    def remember(self, origins, directions):
+        batches.append((origins.copy(), directions.copy()))
+        return plain_run(self, origins, directions)
+
+    work = plan(n_rays, skips=frozenset())
+    EmbreeField.first_faces = remember
+    trace_sample(target, work, np.random.SeedSequence(1))
+    EmbreeField.first_faces = plain_run
+    engine = seconds(lambda: trace_sample(target, work, np.random.SeedSequence(1)))
+
+    def replay():
+        for origins, directions in batches:
+            target.scene.run(origins, directions, output=True)
+
+    raw = seconds(replay)
+    segments = sum(len(origins) for origins, _ in batches)
+    print(
+        f"  segments through Embree      {segments / engine / 1e6:6.2f} M per core-second"
+    )
+    print(f"  the same rays, Embree alone  {segments / raw / 1e6:6.2f} M per core-second")
+    print(f"  ratio                        {raw / engine:6.2f}   (goal 0.75)")
+
+
+def complete_paths(n_rays):
+    """Complete paths with all 16 elements binned, everything on."""
+    field = prepare(surface(SLOPE).sample(3), frozenset(SKIPS))
+    for degrees in (10, 60, 75):
+        work = plan(n_rays, theta=np.deg2rad(degrees))
+        took = seconds(
+            lambda work=work: trace_sample(field, work, np.random.SeedSequence(1))
+        )
+        goal = "   (goal 4)" if degrees == 60 else ""
+        print(
+            f"  incidence {degrees:2d} deg   {n_rays / took / 1e6:6.2f} M paths "
+            f"a core-second{goal}"
+        )
+
+
+def workers(n_rays):
+    """Wall time of one worker over two."""
+    scene = pbrdf.Scene(surface(SLOPE), pbrdf.Material(1.5))
+
+    def work(count):
+        pbrdf.simulate(scene, THETA, n_rays=n_rays, realizations=8, workers=count)
+
+    ratio = wall_seconds(lambda: work(1)) / wall_seconds(lambda: work(2))
+    print(
+        f"  two workers are {ratio:.2f} times one   (goal 1.8; {os.cpu_count()} cores here)"
+    )
+
+
+def skips(n_rays):
+    """Time a scene that needs little: skips on against off, whole runs."""
+    scene = pbrdf.Scene(surface(0.05), pbrdf.Material(1.5))
+
+    def work(allowed):
+        pbrdf.simulate(
+            scene, np.deg2rad(10.0), n_rays=n_rays, realizations=8, skips=allowed
+        )
+
+    ratio = seconds(lambda: work(False), 2) / seconds(lambda: work(True), 2)
+    print(f"  slope 0.05 at 10 deg: {ratio:.1f} times faster with skips   (goal 8)")
+
+
+def wavelengths(n_rays):
+    """Many wavelengths and fewer Stokes elements over one trace."""
+    field = prepare(surface(SLOPE).sample(3), frozenset(SKIPS))
+
+    def took(**options):
+        work = plan(n_rays, **options)
+        return seconds(lambda: trace_sample(field, work, np.random.SeedSequence(1)), 2)
+
+    one = took()
+    print(
+        f"  20 wavelengths cost {took(n=np.linspace(1.4, 1.6, 20)) / one:.2f} times one"
+        "   (goal 2)"
+    )
+    print(
+        f"  100 wavelengths cost {took(n=np.linspace(1.4, 1.6, 100)) / one:.2f} times one"
+        "   (goal 6)"
+    )
+    print(
+        f"  linear output costs {took(stokes=3) / one:.2f} of full, "
+        f"M00 alone {took(stokes=1) / one:.2f}"
+    )
+
+
+def linearity(n_rays):
+    """Time and memory against the number of rays."""
+    field = prepare(surface(SLOPE).sample(3), frozenset(SKIPS))
+
+    def took(rays):
+        return seconds(
+            lambda: trace_sample(field, plan(rays), np.random.SeedSequence(1)), 1
+        )
+
+    few, many = took(n_rays), took(10 * n_rays)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    print(
+        f"  ten times the rays take {many / few:.2f} times as long; "
+        f"peak memory {peak:.2f} GB"
+    )
+
+
+def time_to_error(target):
+    """Whole time to a stated error, against the same physics in plain NumPy and embreex."""
+    drawn = surface(SLOPE)
+    scene = pbrdf.Scene(drawn, pbrdf.Material(1.5))
+    start = time.perf_counter()
+    result = pbrdf.simulate(
+        scene, THETA, n_rays=60_000, realizations=16, target_rel_error=target,
+        n_theta=18, n_dphi=36,
+    )  # fmt: skip
+    ours = time.perf_counter() - start
+    samples = result.attrs["realizations"]
+    # Realisations limit both: the plain program needs as many, with as many rays each
+    start = time.perf_counter()
+    rng = np.random.default_rng(1)
+    tried = 3
+    for k in range(tried):
+        simulate_plainly(drawn.sample(k).heights, THETA, 1.5, 60_000, 18, 36, rng)
+    plain = (time.perf_counter() - start) / tried * samples
+    print(
+        f"  {100 * target:g} % in all bins within a tenth of the peak: "
+        f"{samples} realisations"
+    )
+    print(
+        f"  engine {ours:.1f} s, plain NumPy and embreex {plain:.0f} s "
+        f"(from {tried} realisations)"
+    )
+    print(f"  {plain / ours:.1f} times faster   (goal 10)")
+
+
+def main():
+    """Print every figure."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rays", type=int, default=1_000_000)
+    parser.add_argument("--error", type=float, default=0.02)
+    options = parser.parse_args()
+    warnings.simplefilter("ignore", pbrdf.AccuracyWarning)
+    print(
+        f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, "
+        f"pbrdf {pbrdf.__version__}"
+    )
+    for title, work in (
+        (f"Embree, every skip off (slope {SLOPE}, 60 deg, {SIZE} x {SIZE} cells)",
+         lambda: against_embree(options.rays // 4)),
+        ("Complete paths, everything on", lambda: complete_paths(options.rays)),
+        ("Workers", lambda: workers(options.rays // 8)),
+        ("Skips", lambda: skips(options.rays // 10)),
+        ("Wavelengths and Stokes elements", lambda: wavelengths(options.rays // 8)),
+        ("Rays", lambda: linearity(options.rays // 4)),
+        ("Time to a given error", lambda: time_to_error(options.error)),
+    ):  # fmt: skip
+        print(title)
+        work()
+
+
+if __name__ == "__main__":
+    main()
