@@ -49,7 +49,7 @@ def make_scan(path: str | Path, seed: int) -> xr.Dataset:
         pbrdf.Scene(surface, pbrdf.Material(N)),
         THETA_I,
         phi_i="uniform",
-        n_rays=200_000,
+        n_rays=100_000,
         realizations=64,
         seed=seed,
         n_theta=45,
