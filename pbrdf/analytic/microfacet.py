@@ -23,6 +23,7 @@ from pbrdf.kernels import microfacet as kernel
 from pbrdf.kernels.shadowing import Shadowing
 from pbrdf.kernels.slopes import GAUSSIAN, Roughness, slope_norm
 from pbrdf.kernels.volume import Diffuse
+from pbrdf.optics import library
 from pbrdf.optics.materials import Material
 
 __all__ = ["MicrofacetModel"]
@@ -37,8 +38,8 @@ class MicrofacetModel:
 
     Parameters
     ----------
-    material : Material
-        Index of the facets.
+    material : Material or str
+        Index of the facets, or the name of a material of the library.
     slope_rms : float or (float, float)
         Rms slope PER AXIS, along x and y where they differ. [1]
     slope_distribution : str or SlopeTable
@@ -98,6 +99,8 @@ class MicrofacetModel:
     grazing_form: str = "bounded"
 
     def __post_init__(self) -> None:
+        if isinstance(self.material, str):
+            object.__setattr__(self, "material", library.get(self.material))
         self._check_slopes()
         code_of(SHADOWING, self.shadowing, "shadowing")
         code_of(VOLUME_FORMS, self.volume_form, "volume_form")

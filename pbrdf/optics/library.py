@@ -14,6 +14,8 @@ from pbrdf.optics.read_table import material_from_csv
 
 __all__ = ["get", "names"]
 
+SHORT_NAMES = {"pc": "polycarbonate", "ps": "polystyrene", "silica": "fused-silica"}
+
 
 def _formulas() -> list[Material]:
     """Materials given by a formula, transparent over its range."""
@@ -77,7 +79,7 @@ def get(name: str) -> Material:
     (0.2, 20.0)
     """
     try:
-        return _library()[name]
+        return _library()[SHORT_NAMES.get(name, name)]
     except KeyError:
         known = ", ".join(names())
         msg = f"material must be one of {known}, got {name!r}. Or use Material(n, kappa)."

@@ -68,7 +68,7 @@ def normalised(vectors):
 
 
 def simulate_plainly(heights, theta, index, n_rays, n_theta, n_dphi, rng, max_bounces=16):
-    """Flux of the Mueller matrix by bin and bounces, (3, n_theta, n_dphi, 4, 4), of one ray."""
+    """Mean Mueller matrix a ray, by bounces and bin: (3, n_theta, n_dphi, 4, 4)."""
     scene, normals = build_scene(heights)
     nx, ny = heights.shape
     prop = np.tile([-np.sin(theta), 0.0, -np.cos(theta)], (n_rays, 1))
