@@ -10,7 +10,7 @@ from fitting.statistics_fit import AxisData, AxisFit
 from fitting.statistics_parts import Autocorrelation, AxisStatistics
 from fitting.statistics_solver import fit_axis
 from fitting.statistics_spectrum import measured_cutoff
-from fitting.statistics_variance import mean_power_of_correlation
+from fitting.statistics_variance import increment_covariance, mean_power_of_correlation
 
 Array = np.ndarray
 
@@ -56,12 +56,16 @@ def axis_statistics(
     )
     # A smooth form has a slope of its own; a jagged one only down to a wavelength
     band = cutoff if fit.correlation.form in JAGGED else 0.0
-    length_variance = fit.log_variance(lambda t: fit.correlation_at(t).corr_length)
+    if fit.correlation.form == "gaussian":
+        length = fit.correlation.corr_length
+        length_variance = inflation * fit.log_variance(
+            lambda t: fit.correlation_at(t).corr_length
+        )
+    else:
+        length, length_variance = _measured_fall(fit, data)
     return AxisStatistics(
         axis=name,
-        corr_length=_unbiased(
-            fit.correlation.corr_length, student * inflation * length_variance
-        ),
+        corr_length=_unbiased(length, student * length_variance),
         slope_rms=_derivative_rms(fit, band, 1, inflation * (1 + 1 / freedom)),
         curvature_rms=_derivative_rms(fit, band, 2, inflation * (1 + 1 / freedom)),
         cutoff=cutoff,
@@ -71,6 +75,33 @@ def axis_statistics(
         plain_corr_length=float(sampling.first_fall()),
         fit=fit,
     )
+
+
+def _measured_fall(fit: AxisFit, data: AxisData) -> tuple[float, float]:
+    """Lag where the measured autocorrelation is 1/e [um], and variance of its logarithm.
+
+    Forms with parameters to spare for the short lags that decide the slope need not follow
+    the curve at 1/e; the curve itself does.
+    """
+    white = fit.noise + data.step**2 / 12
+    square = max(fit.mean_square - white, 1e-3 * fit.mean_square) / (1 - fit.loss)
+    fitted = fit.correlation.corr_length
+    found = data.sampling.increments(3 * fitted, 60)
+    rho = 1 - (found.mean_square / 2 - white) / square
+    below = np.flatnonzero(rho < np.exp(-1))
+    if below.size == 0 or below[0] == 0:
+        return fitted, fit.log_variance(lambda t: fit.correlation_at(t).corr_length)
+    i = int(below[0])
+    share = (rho[i - 1] - np.exp(-1)) / (rho[i - 1] - rho[i])
+    length = found.lags[i - 1] + share * (found.lags[i] - found.lags[i - 1])
+    covariance = increment_covariance(
+        np.array([length]), fit.correlation, (fit.variance, white), fit.extent
+    )
+    # rho = 1 - D / (2 h²): what D and h² scatter, over the fall of rho per ln r
+    toward = np.array([1 - np.exp(-1), -0.5]) / square
+    near = np.array([0.9, 1.1]) * fitted
+    fall = np.diff(fit.correlation.rho(near))[0] / np.log(1.1 / 0.9)
+    return float(length), float(toward @ covariance @ toward) / fall**2
 
 
 def _unbiased(length: float, log_variance: float) -> Estimate:
