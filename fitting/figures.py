@@ -70,6 +70,7 @@ def scan_figure(measured: xr.Dataset, curves: xr.Dataset | None = None) -> "Figu
     measured = _with_dolp(measured)
     incidences = np.unique(measured.theta_i.values.round(9))
     rows = 1 if curves is None else 2
+    decades = "M00" in measured and _spans_decades(measured["M00"].values)
     figure, axes = new_figure(rows, len(QUANTITIES), (4.3 * len(QUANTITIES), 2.8 * rows))
     for column, (name, label) in enumerate(QUANTITIES.items()):
         upper = axes[0, column]
@@ -79,7 +80,8 @@ def scan_figure(measured: xr.Dataset, curves: xr.Dataset | None = None) -> "Figu
             if curves is not None:
                 curve = curves.sel(theta_i=theta_i, method="nearest")
                 _draw_curves(upper, name, curve, colour)
-                _draw_residuals(axes[1, column], name, scan, curve, colour)
+                relative = decades and name == "M00"
+                _draw_residuals(axes[1, column], name, scan, curve, colour, relative)
             _draw_points(upper, name, scan, colour)
         upper.set_title(label, fontsize="medium")
         if name not in measured:
@@ -89,14 +91,14 @@ def scan_figure(measured: xr.Dataset, curves: xr.Dataset | None = None) -> "Figu
             )  # fmt: skip
             if rows == 2:
                 axes[1, column].set_visible(False)
-        elif name == "M00" and _spans_decades(measured[name].values):
+        elif name == "M00" and decades:
             upper.set_yscale("log")
     for axis in axes.flat:
         axis.set(xlim=(-90, 90), xticks=range(-90, 91, 30))
     for axis in axes[-1]:
         axis.set_xlabel("view angle [deg], + forward")
     if rows == 2:
-        axes[1, 0].set_ylabel("measured - model")
+        axes[1, 0].set_ylabel("measured / model - 1" if decades else "measured - model")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     columns = min(len(labels), 6)
     figure.legend(
@@ -214,7 +216,12 @@ def _draw_points(axis: "Axes", name: str, scan: xr.Dataset, colour: str | None) 
 
 
 def _draw_residuals(
-    axis: "Axes", name: str, scan: xr.Dataset, curve: xr.Dataset, colour: str | None
+    axis: "Axes",
+    name: str,
+    scan: xr.Dataset,
+    curve: xr.Dataset,
+    colour: str | None,
+    relative: bool,
 ) -> None:
     """Draw what the points of one incidence show beyond each model."""
     axis.axhline(0.0, color="0.4", linewidth=0.8)
@@ -223,8 +230,9 @@ def _draw_residuals(
     at = scan.theta_view.values
     for model, (_, style, own) in _models_of(curve).items():
         there = np.interp(at, curve.theta_view.values, curve[f"{model}_{name}"].values)
+        lacking = scan[name].values - there
         axis.plot(
-            np.rad2deg(at), scan[name].values - there, style, color=colour or own,
-            linewidth=1.0,
+            np.rad2deg(at), lacking / there if relative else lacking, style,
+            color=colour or own, linewidth=1.0,
             marker="." if style == "-" else None, markersize=3,
         )  # fmt: skip

@@ -8,6 +8,7 @@ slope goes into every fitted number.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,8 @@ GAINS = ("specular_gain", "diffuse_albedo")
 # Cells a correlation length: facets then lie within 0.2 % of the surface they stand for
 CELLS = 12
 NODES = 256
+# What a simulation adds to the analytical curve holds for slopes so near to its own
+FAR = 0.1
 
 Progress = Callable[[str, int, int], None]
 
@@ -141,20 +144,27 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
     with clock.stage("analytical fit"):
         analytic = fit(measurement, start, free=free, priors=priors, mask=mask)
 
+    trace = partial(
+        _simulate, statistics, measurement,
+        n_rays=n_rays, realizations=realizations, seed=seed, workers=workers,
+        progress=lambda done, total: clock.report("Monte Carlo", done, total),
+    )  # fmt: skip
     with clock.stage("Monte Carlo"):
-        simulation = _simulate(
-            analytic.model, statistics, measurement,
-            n_rays=n_rays, realizations=realizations, seed=seed, workers=workers,
-            progress=lambda done, total: clock.report("Monte Carlo", done, total),
-        )  # fmt: skip
-
-    with clock.stage("Monte Carlo fit"):
+        simulation = trace(analytic.model)
         curve = SimulatedCurve(simulation, analytic.model)
+    with clock.stage("Monte Carlo fit"):
         weighed = with_simulation_error(measurement, curve)
         monte_carlo = fit(weighed, curve, free=free, priors=priors, mask=mask)
-        scan_slope = None
-        if "slope_rms" not in free:
-            scan_slope = fit(weighed, curve, free=(*free, "slope_rms"), mask=mask)
+    scan_slope = None
+    if "slope_rms" not in free:
+        with clock.stage("slope of the scan"):
+            wider = (*free, "slope_rms")
+            scan_slope = fit(weighed, curve, free=wider, mask=mask)
+            if abs(scan_slope.values["slope_rms"] / statistics.slope_rms.value - 1.0) > FAR:
+                model = scan_slope.model.model
+                curve = SimulatedCurve(trace(model), model)
+                weighed = with_simulation_error(measurement, curve)
+                scan_slope = fit(weighed, curve, free=wider, mask=mask)
 
     return PipelineResult(
         statistics=statistics,
@@ -203,9 +213,9 @@ def with_simulation_error(measurement: xr.Dataset, curve: SimulatedCurve) -> xr.
 
 
 def _simulate(
-    model: MicrofacetModel,
     statistics: SurfaceStatistics,
     measurement: xr.Dataset,
+    model: MicrofacetModel,
     *,
     n_rays: int,
     realizations: int,
