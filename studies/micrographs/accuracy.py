@@ -71,8 +71,8 @@ def aligned(truth: Edge, x: np.ndarray) -> np.ndarray:
 
 
 HEAD = """
-corr blur grain light tilt |  raw   | read slope  | fitted slope | read height | edge   | blur
- px   px    %     %   deg  | slope  | ratio  sd % | ratio  sd %  | ratio  sd % | rms px | ratio"""
+corr blur grain light tilt |  raw   | read slope  | fitted slope | read height | edge | blur
+ px   px    %     %   deg  | slope  | ratio  sd % | ratio  sd %  | ratio  sd % |  px  |"""
 
 
 def main() -> None:
@@ -80,7 +80,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pictures", type=int, default=5, help="pictures a condition")
     parser.add_argument("--lengths", type=float, default=50, help="in corr_length")
-    parser.add_argument("--corr", type=float, nargs="+", default=(10, 30, 100), help="pixels")
+    parser.add_argument(
+        "--corr", type=float, nargs="+", default=(10, 30, 100), help="pixels"
+    )
+    parser.add_argument("--first-seed", type=int, default=0)
     arguments = parser.parse_args()
     print(HEAD)
     kinds = [
@@ -99,15 +102,18 @@ def main() -> None:
             )
             rows = [
                 one_picture(Path(folder), seed, corr, camera, arguments.lengths)
-                for seed in range(arguments.pictures)
+                for seed in range(
+                    arguments.first_seed, arguments.first_seed + arguments.pictures
+                )
             ]
             mean = {key: np.mean([row[key] for row in rows]) for key in rows[0]}
             sd = {key: 100 * np.std([row[key] for row in rows]) for key in rows[0]}
             print(
-                f"{corr:4.0f} {blur:4.1f} {100 * grain:5.0f} {100 * light:5.0f} {tilt:5.1f}  |"
-                f" {mean['raw slope']:6.3f} | {mean['slope']:.3f} {sd['slope']:5.1f} | "
+                f"{corr:4.0f} {blur:4.1f} {100 * grain:5.0f} {100 * light:5.0f} "
+                f"{tilt:5.1f}  | {mean['raw slope']:6.3f} | "
+                f"{mean['slope']:.3f} {sd['slope']:5.1f} | "
                 f"{mean['fitted slope']:.3f} {sd['fitted slope']:5.1f}  | "
-                f"{mean['height']:.3f} {sd['height']:5.1f} | {mean['error']:6.3f} | "
+                f"{mean['height']:.3f} {sd['height']:5.1f} | {mean['error']:.2f} | "
                 f"{mean['blur']:.3f}",
                 flush=True,
             )
