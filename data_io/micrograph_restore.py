@@ -123,7 +123,9 @@ def _excess(
     beyond = wavenumber * blur > 2.2  # less than 1 % of a signal's power
     if np.count_nonzero(beyond) < 16:
         return 1.0
-    return float(np.clip(power[beyond].mean() / max(noise[beyond].mean(), 1e-300), 1.0, 1e6))
+    return float(
+        np.clip(power[beyond].mean() / max(noise[beyond].mean(), 1e-300), 1.0, 1e6)
+    )
 
 
 def _smooth_spectrum(power: np.ndarray) -> np.ndarray:
