@@ -74,5 +74,12 @@ def test_two_bounces_out_of_plane_in_every_element():
     first, out = path_mueller(dir_i, [LEFT, RIGHT], n, kappa)
     second, same = path_mueller(dir_i, [RIGHT, LEFT], n, kappa)
     assert_allclose(out, same, atol=1e-12)
-    assert_allclose(total(result), 0.5 * (first + second), atol=2e-4)
+    # The two orders share the light evenly, but for the places of the rays
+    error = (result.brdf_total_stderr * result.projected_solid_angle).sum(
+        ("theta_s", "dphi")
+    )
+    assert (
+        np.abs(total(result) - 0.5 * (first + second)) < 5 * error.values[0] + 1e-12
+    ).all()
+    assert error.max() < 2e-3
     assert abs(0.5 * (first + second)[2, 3]) > 0.1

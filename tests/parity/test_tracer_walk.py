@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from pbrdf.kernels.heightfield import ESCAPED, HIT, SIDE, Terrain, block_maxima, walk
-from pbrdf.tracer.field import NO_LABELS
+from pbrdf import HeightMap
+from pbrdf.kernels.heightfield import ESCAPED, HIT, SIDE, block_maxima, walk
+from pbrdf.tracer.field import Field
 from tests.brute_force import intersect
 
 STEPS = 100_000
@@ -19,9 +20,13 @@ def rough(seed, shape, amplitude):
     return amplitude * np.random.default_rng(seed).standard_normal(shape)
 
 
+def terrain(heights, periodic):
+    """The field as the tracer prepares it, its steepest slope included."""
+    return Field.of(HeightMap(heights, 1.0, periodic=periodic)).terrain
+
+
 def send(heights, periodic, place, speed, facet=-1):
     """Walk from place = (x, y, z); returns fate, cell, facet and the place there."""
-    maxima, levels = block_maxima(heights, periodic)
     nx, ny = heights.shape if periodic else (heights.shape[0] - 1, heights.shape[1] - 1)
     i, j = min(int(place[0]), nx - 1), min(int(place[1]), ny - 1)
     leave_rate = 0.0
@@ -30,7 +35,7 @@ def send(heights, periodic, place, speed, facet=-1):
         leave_rate = speed[2] - slope[0] * speed[0] - slope[1] * speed[1]
         assert leave_rate > 0
     return walk(
-        Terrain(heights, maxima, levels, heights.max(), np.inf, periodic, 1.0, 1.0, NO_LABELS),
+        terrain(heights, periodic),
         i, j, facet, place[0] - i, place[1] - j, place[2], *speed, leave_rate, STEPS,
     )  # fmt: skip
 
@@ -231,10 +236,9 @@ def test_rays_that_leave_from_vertices_and_edges(seed, facet, corner, step_x, st
     if speed[2] - slope[0] * speed[0] - slope[1] * speed[1] <= 0 or rise == 0:
         return
     z = heights[i, j] + slope[0] * u + slope[1] * v
-    maxima, levels = block_maxima(heights, True)
     leave_rate = speed[2] - slope[0] * speed[0] - slope[1] * speed[1]
     fate, ci, cj, found, _, _, cz = walk(
-        Terrain(heights, maxima, levels, heights.max(), np.inf, True, 1.0, 1.0, NO_LABELS),
+        terrain(heights, True),
         i, j, facet, u, v, z, *speed, leave_rate, STEPS,
     )  # fmt: skip
     place = np.array([i + u, j + v, z])
