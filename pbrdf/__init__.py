@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pbrdf.optics.materials import Material
     from pbrdf.scene import Scene, load_scene
     from pbrdf.simulation import simulate
-    from pbrdf.surface import GaussianSurface, HeightMap
+    from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
 
 __version__ = "0.1.0"
 
@@ -23,6 +23,7 @@ __all__ = [
     "GaussianSurface",
     "HeightMap",
     "Material",
+    "MeasuredSurface",
     "MicrofacetModel",
     "Scene",
     "load_scene",
@@ -36,6 +37,7 @@ _HOME = {
     "GaussianSurface": "pbrdf.surface",
     "HeightMap": "pbrdf.surface",
     "Material": "pbrdf.optics.materials",
+    "MeasuredSurface": "pbrdf.surface",
     "MicrofacetModel": "pbrdf.analytic",
     "Scene": "pbrdf.scene",
     "load_scene": "pbrdf.scene",

@@ -1,7 +1,7 @@
 """A scene: surface, substrate and what lies on it; and its TOML file."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,9 @@ from pbrdf.errors import DataFileError
 from pbrdf.optics import library
 from pbrdf.optics.dispersion import Table
 from pbrdf.optics.materials import Material
-from pbrdf.surface import GaussianSurface, HeightMap
+from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
+
+Surface = HeightMap | GaussianSurface | MeasuredSurface
 
 # A height map up to this many nodes is written into the TOML file itself
 INLINE_NODES = 4096
@@ -22,7 +24,11 @@ _SURFACE_KEYS = {
     "gaussian": {"shape", "spacing_um", "corr_length_um", "slope_rms", "height_rms_um"},
     "height_map": {"file", "heights_um", "spacing_um", "periodic", "labels"},
     "flat": {"size_um"},
-}
+    "measured": {
+        "shape", "spacing_um", "corr_length_um", "height_rms_um",
+        "lags", "autocorrelation", "quantiles",
+    },
+}  # fmt: skip
 _SUBSTRATE_KEYS = {
     "material", "materials", "n", "kappa", "diffuse_albedo", "wavelength_um", "name",
 }  # fmt: skip
@@ -34,7 +40,7 @@ class Scene:
 
     Parameters
     ----------
-    surface : HeightMap or GaussianSurface
+    surface : HeightMap, GaussianSurface or MeasuredSurface
         A fixed surface, or an ensemble of which realisations are drawn.
     substrate : Material or str, or a sequence of them
         Material under the surface, or its name in the library; several where the labels of
@@ -56,19 +62,19 @@ class Scene:
     'bk7'
     """
 
-    surface: HeightMap | GaussianSurface
+    surface: Surface
     substrate: Material | tuple[Material, ...]
     contaminants: tuple[Any, ...] = ()
 
     def __init__(
         self,
-        surface: HeightMap | GaussianSurface,
+        surface: Surface,
         substrate: Material | str | Sequence[Material | str],
         contaminants: tuple[Any, ...] = (),
     ) -> None:
-        if not isinstance(surface, HeightMap | GaussianSurface):
+        if not isinstance(surface, HeightMap | GaussianSurface | MeasuredSurface):
             msg = (
-                f"surface must be a HeightMap or a GaussianSurface, got "
+                f"surface must be a HeightMap, GaussianSurface or MeasuredSurface, got "
                 f"{type(surface).__name__}. Wrap an array of heights [um] in HeightMap."
             )
             raise TypeError(msg)
@@ -121,9 +127,7 @@ class Scene:
         return text
 
 
-def _check_labels(
-    surface: HeightMap | GaussianSurface, materials: tuple[Material, ...]
-) -> None:
+def _check_labels(surface: Surface, materials: tuple[Material, ...]) -> None:
     """Refuse labels that name no material, and materials that no label can name."""
     for material in materials:
         if not isinstance(material, Material):
@@ -206,13 +210,17 @@ def _check_type(
         raise DataFileError(source, f"[surface]: {key!r} is {table[key]!r}", cure)
 
 
+def _check_present(table: Mapping[str, Any], keys: Iterable[str], source: Path) -> None:
+    for key in keys:
+        if key not in table:
+            raise DataFileError(source, f"[surface]: key {key!r} is missing", "Give it.")
+
+
 def _pair(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-def _surface_table(
-    surface: HeightMap | GaussianSurface, file: Path | None
-) -> dict[str, Any]:
+def _surface_table(surface: Surface, file: Path | None) -> dict[str, Any]:
     if isinstance(surface, GaussianSurface):
         table = {
             "type": "gaussian",
@@ -223,6 +231,19 @@ def _surface_table(
         if surface.slope_rms is not None:
             return table | {"slope_rms": surface.slope_rms}
         return table | {"height_rms_um": surface.height_rms}
+    if isinstance(surface, MeasuredSurface):
+        table = {
+            "type": "measured",
+            "shape": list(surface.shape),
+            "spacing_um": _plain(surface.spacing),
+            "height_rms_um": surface.height_rms,
+            "corr_length_um": _plain(surface.corr_length),
+            "lags": list(surface.lags),
+            "autocorrelation": list(surface.autocorrelation),
+        }
+        if surface.quantiles is not None:
+            table["quantiles"] = list(surface.quantiles)
+        return table
     table = {
         "type": "height_map",
         "spacing_um": list(surface.spacing),
@@ -263,7 +284,7 @@ def _substrate_table(material: Material) -> dict[str, Any]:
     return table | {"diffuse_albedo": material.diffuse_albedo}
 
 
-def _read_surface(table: dict[str, Any], source: Path) -> HeightMap | GaussianSurface:
+def _read_surface(table: dict[str, Any], source: Path) -> Surface:
     kind = table.pop("type", None)
     if not isinstance(kind, str) or kind not in _SURFACE_KEYS:
         raise DataFileError(
@@ -273,17 +294,24 @@ def _read_surface(table: dict[str, Any], source: Path) -> HeightMap | GaussianSu
     if kind == "flat":
         return HeightMap.flat(size=_pair(table.get("size_um", 1.0)))
     if kind == "gaussian":
-        for key in ("shape", "spacing_um", "corr_length_um"):
-            if key not in table:
-                raise DataFileError(
-                    source, f"[surface]: key {key!r} is missing", "Give it."
-                )
+        _check_present(table, ("shape", "spacing_um", "corr_length_um"), source)
         return GaussianSurface(
             shape=_pair(table["shape"]),
             spacing=_pair(table["spacing_um"]),
             corr_length=_pair(table["corr_length_um"]),
             slope_rms=table.get("slope_rms"),
             height_rms=table.get("height_rms_um"),
+        )
+    if kind == "measured":
+        _check_present(table, sorted(_SURFACE_KEYS[kind] - {"quantiles"}), source)
+        return MeasuredSurface(
+            shape=_pair(table["shape"]),
+            spacing=_pair(table["spacing_um"]),
+            height_rms=table["height_rms_um"],
+            corr_length=_pair(table["corr_length_um"]),
+            lags=tuple(table["lags"]),
+            autocorrelation=tuple(table["autocorrelation"]),
+            quantiles=tuple(table["quantiles"]) if "quantiles" in table else None,
         )
     if ("file" in table) == ("heights_um" in table):
         raise DataFileError(

@@ -15,7 +15,7 @@ from pbrdf.errors import AccuracyWarning, require
 from pbrdf.kernels.shading import base_strength
 from pbrdf.results import to_dataset
 from pbrdf.scene import Scene
-from pbrdf.surface import GaussianSurface, HeightMap
+from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
 from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.plan import Moments, Plan, Tally
@@ -163,7 +163,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
         )
         draw = partial(_trace_fixed, prepare(shared, allowed), plan)
     else:
-        assert isinstance(surface, GaussianSurface)
+        assert not isinstance(surface, HeightMap)  # a fixed surface is batched
         draw = partial(_trace_realization, surface, plan)
 
     moments = Moments(plan)
@@ -204,7 +204,7 @@ def _trace_fixed(
 
 
 def _trace_realization(
-    surface: GaussianSurface, plan: Plan, seed: np.random.SeedSequence
+    surface: GaussianSurface | MeasuredSurface, plan: Plan, seed: np.random.SeedSequence
 ) -> Tally:
     heights, rays = seed.spawn(2)
     return trace_sample(prepare(surface.sample(heights), plan.skips), plan, rays)
@@ -371,7 +371,7 @@ def _warnings(
 ) -> list[str]:
     notes: list[str] = []
     surface = scene.surface
-    if isinstance(surface, GaussianSurface):
+    if not isinstance(surface, HeightMap):
         if drawn == 1:
             notes.append(
                 "One realisation of a random surface: standard errors hold for this "

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from pbrdf.surface import GaussianSurface
+from pbrdf.surface import GaussianSurface, MeasuredSurface
 
 
 def geometric_optics_warnings(
-    surface: GaussianSurface, theta_i: np.ndarray, wavelength: float
+    surface: GaussianSurface | MeasuredSurface, theta_i: np.ndarray, wavelength: float
 ) -> list[str]:
-    """Say which limits of geometric optics a Gaussian surface breaks at a wavelength [um].
+    """Say which limits of geometric optics a random surface breaks at a wavelength [um].
 
     Checks the coherent beam that stays specular, exp(-(4π h cosθ / λ)²) above 1 % (Davies
     1954), and the tangent plane: typical radius of curvature below 5 λ or correlation

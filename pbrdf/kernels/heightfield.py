@@ -56,7 +56,7 @@ def block_maxima(heights: np.ndarray, periodic: bool) -> tuple[np.ndarray, np.nd
             return np.concatenate(levels), np.array(table, dtype=np.int64)
 
 
-@jit
+@jit(allocates=False)
 def steepest_slope(heights, periodic, pitch_x, pitch_y):
     """Largest slope of any facet, in its own direction of steepest ascent."""
     nx = heights.shape[0] if periodic else heights.shape[0] - 1
@@ -123,7 +123,7 @@ def zero_between(t_a, t_b, clear_a, clear_b):
     return min(max(t_a + (t_b - t_a) * (clear_a / (clear_a - clear_b)), t_a), t_b)
 
 
-@jit
+@jit(allocates=False)
 def fall(heights, periodic, i, j, u, v, z, speed_z):
     """Fate of a vertical ray."""
     if speed_z >= 0.0:

@@ -3,7 +3,7 @@
 from pbrdf.kernels import jit
 
 
-@jit
+@jit(allocates=False)
 def add_sample(flux, scale, count, mean, scatter, mean_total, scatter_total):
     """Add the `count`-th sample to the running moments (Welford) and clear its tally.
 

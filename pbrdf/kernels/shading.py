@@ -92,7 +92,7 @@ def scatter_column(strength, a_in, b_in, a_out, b_out, column, mueller):
     mueller[3, column] = 0.0
 
 
-@jit
+@jit(allocates=False)
 def reflect_often(record, ray, bounces, w, optics, n_stokes, mueller):
     """Mueller matrix of a path of any length, all its columns side by side."""
     n, kappa, base = optics.n, optics.kappa, optics.base

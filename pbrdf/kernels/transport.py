@@ -8,8 +8,6 @@ the record up to its own hit.
 
 import math
 
-import numpy as np
-
 from pbrdf.kernels import jit
 from pbrdf.kernels.entry import TWO_PI, entry_line, first_ray, wrap_into
 from pbrdf.kernels.frames import PARALLEL, turn_frame
@@ -34,7 +32,6 @@ from pbrdf.kernels.shading import (
     LABEL,
     N_ESCAPED,
     N_LEAKED,
-    N_RECORD,
     N_SEGMENTS,
     N_SIDE,
     N_TRUNCATED,
@@ -233,15 +230,14 @@ def trace_ray(
         )  # fmt: skip
 
 
-@jit
-def trace_batch(terrain, source, max_bounces, optics, tally):
+@jit(allocates=False)
+def trace_batch(terrain, source, record, waiting, optics, tally):
     """Trace rays of one incident direction and add their Mueller matrices to the tally.
 
-    Every ray walks from its entry point in the top plane; see `sweep_batch`.
+    Every ray walks from its entry point in the top plane; see `sweep_batch`. `record`
+    (bounces + 1, 1, N_RECORD) and `waiting` (bounces, N_WAITING) are room to work in.
     """
     launch = source.launch
-    record = np.empty((max_bounces + 1, 1, N_RECORD))
-    waiting = np.empty((max_bounces, N_WAITING))
     for line in range(source.n_lines):
         start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = (
             entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
@@ -266,8 +262,8 @@ def trace_batch(terrain, source, max_bounces, optics, tally):
             )  # fmt: skip
 
 
-@jit
-def sweep_batch(terrain, source, max_bounces, optics, tally):
+@jit(allocates=False)
+def sweep_batch(terrain, source, record, waiting, optics, tally):
     """`trace_batch` over a periodic field, without a search for the first facets.
 
     The rays of a line travel in one vertical plane. There a ray is the line of constant
@@ -277,8 +273,6 @@ def sweep_batch(terrain, source, max_bounces, optics, tally):
     """
     nx, ny = terrain.heights.shape
     z_top = terrain.z_top
-    record = np.empty((max_bounces + 1, 1, N_RECORD))
-    waiting = np.empty((max_bounces, N_WAITING))
     for line in range(source.n_lines):
         start_x, start_y, speed_x, speed_y, length, unit, offset, cos_phi, sin_phi = (
             entry_line(line, source, terrain.pitch_x, terrain.pitch_y)

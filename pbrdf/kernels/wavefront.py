@@ -57,7 +57,7 @@ MeshFrame = namedtuple(
 )
 
 
-@jit
+@jit(allocates=False)
 def enter_rays(terrain, source, first, state, cell, active):
     """Put rays `first`, first + 1 ... of a batch at their entry points in the top plane."""
     launch = source.launch
@@ -97,7 +97,7 @@ def enter_rays(terrain, source, first, state, cell, active):
         active[k] = k
 
 
-@jit
+@jit(allocates=False)
 def emit_rays(terrain, frame, state, cell, active, origins, directions):
     """Write the active rays as Embree takes them: centred, in units of a cell, float32."""
     pitch_x, pitch_y, unit = terrain.pitch_x, terrain.pitch_y, frame.unit
@@ -124,7 +124,7 @@ def emit_rays(terrain, frame, state, cell, active, origins, directions):
         directions[a, 2] = state[k, KZ]
 
 
-@jit
+@jit(allocates=False)
 def arrive_on_facet(terrain, i, j, facet, k, state, column, row):
     """Place (u, v, z) where a ray from cell (i, j) meets a facet of the cell (column, row).
 
@@ -151,7 +151,7 @@ def arrive_on_facet(terrain, i, j, facet, k, state, column, row):
     return ci, cj, u, v, heights[ci, cj] + step_x * u + step_y * v
 
 
-@jit
+@jit(allocates=False)
 def leave_mesh(terrain, frame, i, j, k, state):
     """Time at which a ray that hits nothing leaves the rectangle of the mesh."""
     nx, ny = cell_counts(terrain)
@@ -177,7 +177,7 @@ def leave_mesh(terrain, frame, i, j, k, state):
     return max(t, 0.0)
 
 
-@jit
+@jit(allocates=False)
 def advance_rays(terrain, frame, faces, state, cell, active, record, optics, tally):
     """Take the active rays through the answers of Embree, and tally those whose path ends.
 

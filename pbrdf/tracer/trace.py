@@ -7,7 +7,7 @@ import numpy as np
 from pbrdf.kernels import shading
 from pbrdf.kernels.binning import bin_edges
 from pbrdf.kernels.entry import Source
-from pbrdf.kernels.transport import sweep_batch, trace_batch
+from pbrdf.kernels.transport import N_WAITING, sweep_batch, trace_batch
 from pbrdf.surface.heightmap import HeightMap
 from pbrdf.tracer.embree import EmbreeField, trace_waves
 from pbrdf.tracer.field import Field
@@ -33,6 +33,8 @@ def trace_sample(
     tally = Tally.empty(plan)
     zenith, azimuth = bin_edges(plan.n_theta, plan.n_dphi)
     optics = shading.Optics(plan.n, plan.kappa, plan.base, plan.n_stokes)
+    record = np.empty((plan.max_bounces + 1, 1, shading.N_RECORD))
+    waiting = np.empty((plan.max_bounces, N_WAITING))
     rng = np.random.default_rng(seed)
     shifts = rng.random((len(plan.theta_i), 3))
     streams = rng.integers(2**63, size=len(plan.theta_i), dtype=np.uint64)
@@ -52,7 +54,7 @@ def trace_sample(
             trace_waves(target, source, plan.max_bounces, optics, bins)
         elif field.periodic and "sweep" in plan.skips:
             # One pass along each line of entry points finds all first facets
-            sweep_batch(field.terrain, source, plan.max_bounces, optics, bins)
+            sweep_batch(field.terrain, source, record, waiting, optics, bins)
         else:
-            trace_batch(field.terrain, source, plan.max_bounces, optics, bins)
+            trace_batch(field.terrain, source, record, waiting, optics, bins)
     return tally
