@@ -92,7 +92,7 @@ def meridian_frame(
     Examples
     --------
     >>> e_s, e_p = meridian_frame([1.0, 0.0, 0.0])
-    >>> e_s, e_p
+    >>> e_s + 0.0, e_p + 0.0
     (array([0., 1., 0.]), array([0., 0., 1.]))
     """
     k = np.asarray(prop, dtype=np.float64)
