@@ -39,6 +39,9 @@ def simulate(
     stokes: options.StokesOption = Stokes.full,
     seed: options.Seed = 0,
     workers: options.Workers = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Say what was not computed, and why.")
+    ] = False,
 ) -> None:
     """Simulate the Mueller BRDF of a rough surface over the whole hemisphere.
 
@@ -72,8 +75,11 @@ def simulate(
                 stokes=stokes.value,
                 workers=workers,
                 progress=progress,
+                explain=explain,
             )
         write_result(result, stage)
+    for line in result.attrs["explanation"]:
+        typer.echo(line)
     for line in budget(result):
         typer.echo(line)
     typer.echo(f"Result: {target_file}")
