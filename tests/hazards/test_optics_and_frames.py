@@ -143,11 +143,11 @@ def test_b20_a_thousand_bounces_in_a_narrow_groove(skips, phi_i):
 def test_b21_tallies_count_every_ray():
     scene = Scene(HeightMap.flat(), Material.mirror())
     result = simulate(
-        scene, 0.5, n_rays=5_000_000, n_theta=3, n_dphi=2, stokes="unpolarized"
+        scene, 0.5, n_rays=1_000_000, n_theta=3, n_dphi=2, stokes="unpolarized"
     )
     assert result.brdf.dtype == np.float64
     flux = (result.brdf_total * result.projected_solid_angle).sum().item()
-    assert abs(flux * 5_000_000 - 5_000_000) < 1e-3
+    assert abs(flux * 1_000_000 - 1_000_000) < 1e-3
 
 
 def test_b23_tilt_about_x_gives_the_sign_of_u():
