@@ -26,10 +26,12 @@ START_LEVEL = 3  # blocks of 8 cells: where a ray from above starts to look
 
 
 # A height field as the kernels take it: node heights, the pyramid of `block_maxima`, the
-# highest node, the largest slope (inf: not to be used), whether it repeats, the grid steps
-# and the material of each cell (of no size: all 0)
+# highest node, the slope from which on a rising ray is free at once (inf: not to be used),
+# the largest slope of a facet, whether the field repeats, the grid steps and the material
+# of each cell (of no size: all 0)
 Terrain = namedtuple(
-    "Terrain", "heights maxima levels z_top steepest periodic pitch_x pitch_y labels"
+    "Terrain",
+    "heights maxima levels z_top free_slope steepest periodic pitch_x pitch_y labels",
 )
 
 
@@ -251,7 +253,12 @@ def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, m
                 i = min(max(int(x0 + speed_x * t_out), low_x), high_x - 1)
         if i < 0 or i >= nx or j < 0 or j >= ny:
             if not periodic:
-                fate = ESCAPED if rising and z_out >= z_top else SIDE
+                # Beyond the rim the surface is taken to be no higher and no steeper
+                level_x = speed_x * terrain.pitch_x
+                level_y = speed_y * terrain.pitch_y
+                reach = math.sqrt(level_x * level_x + level_y * level_y)
+                above = rising and z_out >= z_top
+                fate = ESCAPED if above or speed_z >= terrain.steepest * reach else SIDE
                 return fate, i, j, -1, u, v, z_out
             if i < 0:
                 i += nx
@@ -278,7 +285,7 @@ def leave_facet(terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate, max_st
     A ray that rises more steeply than any facet can meet none.
     """
     level = math.sqrt(k_x * k_x + k_y * k_y)
-    if k_z >= terrain.steepest * level:
+    if k_z >= terrain.free_slope * level:
         return ESCAPED, i, j, -1, u, v, z
     return walk(
         terrain, i, j, facet, u, v, z,

@@ -28,7 +28,8 @@ SPECULAR = -1.0  # in COS_OUT: mirror reflection
 
 # What became of the rays of a sample, the path segments they took, and the hits of a facet
 # just left (impossible but for rounding inside the intersector)
-N_ESCAPED, N_TRUNCATED, N_LEAKED, N_SIDE, N_SEGMENTS, N_SELF, N_COUNTS = 0, 1, 2, 3, 4, 5, 6
+N_ESCAPED, N_TRUNCATED, N_LEAKED, N_SIDE, N_SEGMENTS, N_SELF = 0, 1, 2, 3, 4, 5
+N_ORDERS, N_COUNTS = 6, 9  # then the escaped paths by class of bounces
 # Energies of unpolarised light
 ABSORBED, TRUNCATED, LEAKED, SIDEWAYS, N_ENERGIES = 0, 1, 2, 3, 4
 
@@ -173,6 +174,7 @@ def tally_path(
         k_x, k_y, k_z, cos_phi_i, sin_phi_i, tally.zenith, tally.azimuth
     )
     order = min(bounces, flux.shape[1]) - 1
+    tally.counts[N_ORDERS + order] += 1
     for w in range(energy.shape[0]):
         path_mueller(record, ray, bounces, w, optics, n_stokes, mueller)
         energy[w, ABSORBED] -= mueller[0, 0]

@@ -241,7 +241,9 @@ def advance_rays(terrain, frame, faces, state, cell, active, record, optics, tal
             # Nothing was hit: the ray rises above the surface, or leaves the mesh below it
             t = leave_mesh(terrain, frame, cell[k, CELL_I], cell[k, CELL_J], k, state)
             height = state[k, Z] + state[k, KZ] * t if state[k, KZ] != 0.0 else state[k, Z]
-            if state[k, KZ] > 0.0 and height >= terrain.z_top:
+            level = math.sqrt(state[k, KX] ** 2 + state[k, KY] ** 2)
+            steep = state[k, KZ] >= terrain.steepest * level
+            if state[k, KZ] > 0.0 and (steep or height >= terrain.z_top):
                 end = N_ESCAPED if bounces > 0 else N_LEAKED
             elif not terrain.periodic:
                 end = N_SIDE

@@ -36,12 +36,14 @@ class Field:
     def of(cls, surface: HeightMap) -> "Field":
         """Prepare a height map without missing heights."""
         maxima, levels = block_maxima(surface.heights, surface.periodic)
+        steepest = steepest_slope(surface.heights, surface.periodic, *surface.spacing)
         terrain = Terrain(
             heights=surface.heights,
             maxima=maxima,
             levels=levels,
             z_top=float(surface.heights.max()),
-            steepest=steepest_slope(surface.heights, surface.periodic, *surface.spacing),
+            free_slope=steepest,
+            steepest=steepest,
             periodic=surface.periodic,
             pitch_x=surface.spacing[0],
             pitch_y=surface.spacing[1],

@@ -59,7 +59,7 @@ class Tally:
     """Flux, energy and counts of one sample, per incident direction.
 
     `flux` has the shape of the plan and is not normalised; `energy` (angles, wavelengths,
-    4) is what was absorbed, truncated, leaked and lost sideways; `counts` (angles, 6) as in
+    4) is what was absorbed, truncated, leaked and lost sideways; `counts` (angles, 9) as in
     `pbrdf.kernels.shading`.
     """
 
@@ -102,7 +102,16 @@ class Moments:
         # a base splits rays, only a part of each may leave so and has its own account
         aside = tally.counts[:, shading.N_SIDE] if self.plan.base.shape[1] == 0 else 0
         counted = np.broadcast_to(self.plan.n_rays - aside, (angles,))
-        scale = 1.0 / np.maximum(counted, 1)
+        if not counted.all():
+            worst = int(np.flatnonzero(counted == 0)[0])
+            msg = (
+                "n_rays must leave some rays on the finite map, got "
+                f"{self.plan.n_rays} a batch, all of which left it sideways at theta_i "
+                f"{self.plan.theta_i[worst]:.4g} rad. Take more rays, a larger map or "
+                "HeightMap.mirrored()."
+            )
+            raise ValueError(msg)
+        scale = 1.0 / counted
         for a in range(angles):
             add_sample(
                 tally.flux[a].reshape(wavelengths, orders, -1), scale[a], self.samples,
@@ -114,18 +123,34 @@ class Moments:
         self._albedo.append(tally.flux[..., 0, 0].sum(axis=(3, 4)) * scale[:, None, None])
         self._energy.append(tally.energy * scale[:, None, None])
 
-    def _stderr(self, scatter: np.ndarray) -> np.ndarray:
+    def _stderr(self, mean: np.ndarray, scatter: np.ndarray, one: np.ndarray) -> np.ndarray:
+        """Compute the standard error of a mean over samples.
+
+        The spread over samples says nothing of a bin that no path reached. A count of none,
+        seen without prior knowledge, has variance 1: there the error is one path of the
+        mean strength `one`.
+        """
         if self.samples < 2:
             return np.full_like(scatter, np.nan)
-        return np.sqrt(scatter / (self.samples - 1) / self.samples)
+        spread = np.sqrt(scatter / (self.samples - 1) / self.samples)
+        return np.where(mean[..., :1, :1] == 0.0, one, spread)
+
+    def _one_path(self) -> np.ndarray:
+        """Mean flux of one escaped path (angles, wavelengths, bounces) in the mean flux."""
+        counts = self.counts[:, None, shading.N_ORDERS :]
+        albedo = np.mean(self._albedo, axis=0)
+        return np.where(counts > 0, albedo / np.maximum(counts, 1), 0.0)
 
     def flux(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean flux by bounces and its standard error, in the shape of the plan."""
-        return self._mean, self._stderr(self._scatter)
+        one = self._one_path()[..., None, None, None, None]
+        return self._mean, self._stderr(self._mean, self._scatter, one)
 
     def flux_total(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the same for all bounces together."""
-        return self._mean_total, self._stderr(self._scatter_total)
+        one = np.sqrt((self._one_path() ** 2).sum(axis=2))[..., None, None, None, None]
+        stderr = self._stderr(self._mean_total, self._scatter_total, one)
+        return self._mean_total, stderr
 
     def albedo(self) -> tuple[np.ndarray, np.ndarray]:
         """Albedo (angles, wavelengths, bounces) and its standard error."""

@@ -18,7 +18,7 @@ def prepare(surface: HeightMap, skips: frozenset[str]) -> Field | EmbreeField:
     """Make a surface ready for tracing with the skips allowed: the walk, or else Embree."""
     field = Field.of(surface)
     if "steep" not in skips:
-        field = replace(field, terrain=field.terrain._replace(steepest=np.inf))
+        field = replace(field, terrain=field.terrain._replace(free_slope=np.inf))
     return field if "walk" in skips else EmbreeField.of(field)
 
 

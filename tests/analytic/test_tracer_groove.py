@@ -75,9 +75,9 @@ def test_two_bounces_out_of_plane_in_every_element():
     second, same = path_mueller(dir_i, [RIGHT, LEFT], n, kappa)
     assert_allclose(out, same, atol=1e-12)
     # The two orders share the light evenly, but for the places of the rays
-    error = (result.brdf_total_stderr * result.projected_solid_angle).sum(
-        ("theta_s", "dphi")
-    )
+    lit = result.brdf_total.isel(stokes_out=0, stokes_in=0) > 0
+    error = (result.brdf_total_stderr * result.projected_solid_angle).where(lit)
+    error = error.sum(("theta_s", "dphi"))
     assert (
         np.abs(total(result) - 0.5 * (first + second)) < 5 * error.values[0] + 1e-12
     ).all()
