@@ -169,12 +169,11 @@ def simulate(  # noqa: PLR0913  (the public signature)
 
     moments = Moments(plan)
     limit = samples if target is None else max(samples, MAX_SAMPLES)
-    least = samples if batched else min(samples, limit)
     for tally in _in_order(draw, root, limit, _workers(workers)):
         moments.add(tally)
         if progress is not None:
             progress(moments.samples, samples if target is None else limit)
-        enough = moments.samples >= max(least, 2)
+        enough = moments.samples >= max(samples, 2)
         if target is not None and enough and moments.rel_error() <= target:
             break
     return to_dataset(

@@ -66,12 +66,6 @@ class Field:
         """Height of the highest node above the lowest. [um]"""
         return float(self.terrain.z_top - self.z_bottom)
 
-    @property
-    def cells(self) -> tuple[int, int]:
-        """Number of grid cells along x and y."""
-        nx, ny = self.terrain.heights.shape
-        return (nx, ny) if self.periodic else (nx - 1, ny - 1)
-
     def entry_lines(self, launch: np.ndarray, n_rays: int) -> int:
         """Count the lines that space `n_rays` rays evenly both along and across them."""
         width, depth = launch[2] * self.pitch[0], launch[3] * self.pitch[1]

@@ -39,25 +39,14 @@ def plan(n_rays, *, theta=THETA, skips=frozenset(SKIPS), n=1.5, stokes=4):
     )  # fmt: skip
 
 
-def seconds(work, repeats=3):
-    """CPU time of the fastest of some runs after a first."""
+def seconds(work, repeats=3, clock=time.process_time):
+    """Time of the fastest of some runs after a first: of the CPU, or by another clock."""
     work()
     best = np.inf
     for _ in range(repeats):
-        start = time.process_time()
+        start = clock()
         work()
-        best = min(best, time.process_time() - start)
-    return best
-
-
-def wall_seconds(work, repeats=3):
-    """Wall time of the fastest of some runs after a first."""
-    work()
-    best = np.inf
-    for _ in range(repeats):
-        start = time.perf_counter()
-        work()
-        best = min(best, time.perf_counter() - start)
+        best = min(best, clock() - start)
     return best
 
 
@@ -109,10 +98,13 @@ def workers(n_rays):
     """Wall time of one worker over two."""
     scene = pbrdf.Scene(surface(SLOPE), pbrdf.Material(1.5))
 
-    def work(count):
-        pbrdf.simulate(scene, THETA, n_rays=n_rays, realizations=8, workers=count)
+    def took(count):
+        def work():
+            pbrdf.simulate(scene, THETA, n_rays=n_rays, realizations=8, workers=count)
 
-    ratio = wall_seconds(lambda: work(1)) / wall_seconds(lambda: work(2))
+        return seconds(work, clock=time.perf_counter)
+
+    ratio = took(1) / took(2)
     print(
         f"  two workers are {ratio:.2f} times one   (goal 1.8; {os.cpu_count()} cores here)"
     )
