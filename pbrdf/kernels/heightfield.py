@@ -18,7 +18,7 @@ import numpy as np
 
 from pbrdf.kernels import jit
 
-ESCAPED, HIT, SIDE, LOST = 0, 1, 2, 3
+ESCAPED, HIT, SIDE, LOST, REACHED = 0, 1, 2, 3, 4
 FACET_LOW, FACET_HIGH = 0, 1  # the facet with u > v, and the one with u < v
 UNKNOWN = -1.0  # a clearance that was not followed
 NEVER = 1e300  # time per cell of a ray that does not move along an axis
@@ -126,29 +126,37 @@ def zero_between(t_a, t_b, clear_a, clear_b):
 
 
 @jit(allocates=False)
-def fall(heights, periodic, i, j, u, v, z, speed_z):
-    """Fate of a vertical ray."""
+def fall(heights, periodic, i, j, u, v, z, speed_z, t_limit):
+    """Fate of a vertical ray, as from `walk_until`."""
     if speed_z >= 0.0:
-        return ESCAPED, i, j, -1, u, v, z
+        fate = ESCAPED if t_limit == NEVER else REACHED
+        return fate, i, j, -1, u, v, z + speed_z * t_limit, t_limit
     z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
     facet = FACET_LOW if u > v else FACET_HIGH
-    return HIT, i, j, facet, u, v, plane_height(z00, z10, z01, z11, facet, u, v)
+    surface = plane_height(z00, z10, z01, z11, facet, u, v)
+    t = max((surface - z) / speed_z, 0.0)
+    if t > t_limit:
+        return REACHED, i, j, -1, u, v, z + speed_z * t_limit, t_limit
+    return HIT, i, j, facet, u, v, surface, t
 
 
 # One loop on purpose: every step decides between blocks, cells and facets, and a call in it
 # would cost as much as the step
 @jit(inline="always")
-def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, max_steps):
+def walk_until(
+    terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, t_limit, max_steps
+):  # fmt: skip
     """Follow a ray from (u, v) of cell (i, j) at height z to the next facet it meets.
 
     With facet >= 0 the ray starts on that facet and leaves it at `leave_rate` > 0 per unit
-    of t; with -1 it starts in free space. Returns (fate, i, j, facet, u, v, z).
+    of t; with -1 it starts in free space. Beyond t_limit nothing matters: the fate is then
+    REACHED, or ESCAPED. Returns (fate, i, j, facet, u, v, z, t).
     """
     heights, maxima, levels = terrain.heights, terrain.maxima, terrain.levels
     periodic, z_top = terrain.periodic, terrain.z_top
     nx, ny = cell_counts(terrain)
     if speed_x == 0.0 and speed_y == 0.0:
-        return fall(heights, periodic, i, j, u, v, z, speed_z)
+        return fall(heights, periodic, i, j, u, v, z, speed_z, t_limit)
 
     # The ray in the plane is x0 + speed_x t; x0 moves back by a period at each wrap
     x0 = i + u
@@ -166,7 +174,9 @@ def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, m
         # Above the highest peak a rising ray is free
         z_in = z + speed_z * t
         if rising and z_in > z_top:
-            return ESCAPED, i, j, -1, u, v, z_in
+            return ESCAPED, i, j, -1, u, v, z_in, t
+        if t > t_limit:
+            return REACHED, i, j, -1, u, v, z_in, t
 
         # Where and when the ray leaves the present block
         low_x = (i >> level) << level
@@ -226,9 +236,11 @@ def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, m
                     # A facet met at a corner only, and moved away from, is no hit
                     if clear_mid <= 0.0 and clear_mid < clear:
                         t_hit = zero_between(t, t_mid, clear, clear_mid)
+                        if t_hit > t_limit:
+                            return REACHED, i, j, -1, u, v, z_out, t_limit
                         u = x0 + speed_x * t_hit - i
                         v = y0 + speed_y * t_hit - j
-                        return HIT, i, j, first, u, v, z + speed_z * t_hit
+                        return HIT, i, j, first, u, v, z + speed_z * t_hit, t_hit
                 clear = clear_mid
 
                 # Through the second facet, if the ray crosses the diagonal
@@ -238,9 +250,11 @@ def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, m
                     clear = z_out - surface
                     if clear <= 0.0 and clear < clear_mid:
                         t_hit = zero_between(t_mid, t_out, clear_mid, clear)
+                        if t_hit > t_limit:
+                            return REACHED, i, j, -1, u, v, z_out, t_limit
                         u = x0 + speed_x * t_hit - i
                         v = y0 + speed_y * t_hit - j
-                        return HIT, i, j, second, u, v, z + speed_z * t_hit
+                        return HIT, i, j, second, u, v, z + speed_z * t_hit, t_hit
 
         # Step over the edge into the next block; inside a block keep to its rows
         if t_x <= t_y:
@@ -259,7 +273,7 @@ def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, m
                 reach = math.sqrt(level_x * level_x + level_y * level_y)
                 above = rising and z_out >= z_top
                 fate = ESCAPED if above or speed_z >= terrain.steepest * reach else SIDE
-                return fate, i, j, -1, u, v, z_out
+                return fate, i, j, -1, u, v, z_out, t_out
             if i < 0:
                 i += nx
                 x0 += nx
@@ -275,7 +289,17 @@ def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, m
         t = t_out
         if clear < 0.0 and level < levels.shape[0]:
             level += 1
-    return LOST, i, j, -1, u, v, z + speed_z * t
+    return LOST, i, j, -1, u, v, z + speed_z * t, t
+
+
+@jit(inline="always")
+def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, max_steps):
+    """`walk_until` without a limit: (fate, i, j, facet, u, v, z)."""
+    fate, i, j, facet, u, v, z, _ = walk_until(
+        terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, NEVER,
+        max_steps,
+    )  # fmt: skip
+    return fate, i, j, facet, u, v, z
 
 
 @jit(inline="always")
