@@ -13,19 +13,29 @@ if TYPE_CHECKING:
     from pbrdf.optics.materials import Material
     from pbrdf.scene import Scene, load_scene
     from pbrdf.simulation import simulate
-    from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
+    from pbrdf.surface import (
+        Drops,
+        Film,
+        GaussianSurface,
+        HeightMap,
+        MeasuredSurface,
+        Spheres,
+    )
 
 __version__ = "0.1.0"
 
 __all__ = [
     "AccuracyWarning",
     "DataFileError",
+    "Drops",
+    "Film",
     "GaussianSurface",
     "HeightMap",
     "Material",
     "MeasuredSurface",
     "MicrofacetModel",
     "Scene",
+    "Spheres",
     "load_scene",
     "materials",
     "simulate",
@@ -34,12 +44,15 @@ __all__ = [
 _HOME = {
     "AccuracyWarning": "pbrdf.errors",
     "DataFileError": "pbrdf.errors",
+    "Drops": "pbrdf.surface",
+    "Film": "pbrdf.surface",
     "GaussianSurface": "pbrdf.surface",
     "HeightMap": "pbrdf.surface",
     "Material": "pbrdf.optics.materials",
     "MeasuredSurface": "pbrdf.surface",
     "MicrofacetModel": "pbrdf.analytic",
     "Scene": "pbrdf.scene",
+    "Spheres": "pbrdf.surface",
     "load_scene": "pbrdf.scene",
     "simulate": "pbrdf.simulation",
 }

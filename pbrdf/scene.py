@@ -13,9 +13,17 @@ from pbrdf.errors import DataFileError
 from pbrdf.optics import library
 from pbrdf.optics.dispersion import Table
 from pbrdf.optics.materials import Material
-from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
+from pbrdf.surface import (
+    Drops,
+    Film,
+    GaussianSurface,
+    HeightMap,
+    MeasuredSurface,
+    Spheres,
+)
 
 Surface = HeightMap | GaussianSurface | MeasuredSurface
+Contamination = Drops | Spheres | Film
 
 # A height map up to this many nodes is written into the TOML file itself
 INLINE_NODES = 4096
@@ -45,32 +53,33 @@ class Scene:
     substrate : Material or str, or a sequence of them
         Material under the surface, or its name in the library; several where the labels of
         a HeightMap number them.
-    contaminants : tuple
-        What lies on the surface; none is known to this version.
+    contaminants : Drops, Spheres or Film, or a sequence of them
+        What lies on the surface; where two overlap, the first rules. One Film at most.
 
     Raises
     ------
     TypeError
-        If the surface is of another type.
+        If the surface or a contaminant is of another type.
     ValueError
-        If the library does not know the material, or contaminants are given.
+        If the library does not know the material, or two contaminants are films.
 
     Examples
     --------
-    >>> scene = Scene(HeightMap.flat(size=(10.0, 10.0)), "bk7")
-    >>> scene.substrate.name
-    'bk7'
+    >>> from pbrdf.surface import Film
+    >>> scene = Scene(HeightMap.flat(size=(10.0, 10.0)), "bk7", Film(thickness=5.0))
+    >>> scene.substrate.name, scene.contaminants[0].material.name
+    ('bk7', 'water')
     """
 
     surface: Surface
     substrate: Material | tuple[Material, ...]
-    contaminants: tuple[Any, ...] = ()
+    contaminants: tuple[Contamination, ...] = ()
 
     def __init__(
         self,
         surface: Surface,
         substrate: Material | str | Sequence[Material | str],
-        contaminants: tuple[Any, ...] = (),
+        contaminants: Contamination | Sequence[Contamination] = (),
     ) -> None:
         if not isinstance(surface, HeightMap | GaussianSurface | MeasuredSurface):
             msg = (
@@ -78,19 +87,13 @@ class Scene:
                 f"{type(surface).__name__}. Wrap an array of heights [um] in HeightMap."
             )
             raise TypeError(msg)
-        if len(contaminants) > 0:
-            msg = (
-                f"contaminants must be empty in this version, got {len(contaminants)}. "
-                "Only clean opaque surfaces are simulated."
-            )
-            raise ValueError(msg)
         several = not isinstance(substrate, str | Material)
         listed: Any = substrate if several else (substrate,)
         materials = tuple(library.get(m) if isinstance(m, str) else m for m in listed)
         _check_labels(surface, materials)
         object.__setattr__(self, "surface", surface)
         object.__setattr__(self, "substrate", materials if several else materials[0])
-        object.__setattr__(self, "contaminants", tuple(contaminants))
+        object.__setattr__(self, "contaminants", _checked(contaminants))
 
     @property
     def materials(self) -> tuple[Material, ...]:
@@ -125,6 +128,24 @@ class Scene:
             temporary.write_text(text, encoding="utf-8")
             temporary.replace(target)
         return text
+
+
+def _checked(given: Contamination | Sequence[Contamination]) -> tuple[Contamination, ...]:
+    """Return the contaminants as a tuple; refuse other types and a second film."""
+    listed = (given,) if isinstance(given, Contamination) else tuple(given)
+    for number, one in enumerate(listed):
+        if not isinstance(one, Contamination):
+            msg = (
+                "contaminants must be Drops, Spheres or Film, got "
+                f"{type(one).__name__} at index {number}. Wrap what lies on the surface "
+                "in one of these."
+            )
+            raise TypeError(msg)
+    films = sum(isinstance(one, Film) for one in listed)
+    if films > 1:
+        msg = f"contaminants must hold at most one Film, got {films}. Leave one out."
+        raise ValueError(msg)
+    return listed
 
 
 def _check_labels(surface: Surface, materials: tuple[Material, ...]) -> None:

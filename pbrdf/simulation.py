@@ -357,6 +357,12 @@ def _constants(
 
 
 def _check_scene(scene: Scene) -> None:
+    if scene.contaminants:
+        msg = (
+            f"contaminants must be empty in this version, got {len(scene.contaminants)}. "
+            "Only clean opaque surfaces are simulated."
+        )
+        raise ValueError(msg)
     if isinstance(scene.surface, HeightMap) and scene.surface.missing > 0.0:
         msg = (
             "heights must be complete to be traced, got "
