@@ -31,14 +31,14 @@ def bin_edges(n_theta, n_dphi):
     return zenith, azimuth
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def rough_arccos(x):
     """Arccos of x in [0, 1] to 7e-5 (Abramowitz and Stegun, eq. 4.4.45)."""
     series = 1.5707288 + x * (-0.2121144 + x * (0.0742610 - 0.0187293 * x))
     return math.sqrt(max(1.0 - x, 0.0)) * series
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def rough_azimuth(x, y):
     """Angle of (x, y) in [0, 2 pi) to 1e-3, after Abramowitz and Stegun, eq. 4.4.49."""
     a = abs(x)
@@ -55,7 +55,7 @@ def rough_azimuth(x, y):
     return TWO_PI - angle if y < 0.0 else angle
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def bin_of_direction(x, y, z, cos_phi_i, sin_phi_i, zenith, azimuth):
     """Bin (theta_s, dphi) of a unit direction above the surface, by `bin_edges`."""
     n_theta = zenith.shape[0] - 1

@@ -25,13 +25,13 @@ Source = namedtuple(
 )
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def fraction(x):
     """Part of x after the point."""
     return x - math.floor(x)
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def entry_line(line, source, pitch_x, pitch_y):
     """One line of entry points, followed in the direction in which the light travels.
 
@@ -66,13 +66,13 @@ def entry_line(line, source, pitch_x, pitch_y):
     )  # fmt: skip
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def first_ray(line, source):
     """First ray of a line; the rays are dealt evenly to the lines."""
     return -((-line * source.n_rays) // source.n_lines)
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def wrap_into(x, low, length):
     """Place x, brought into [low, low + length) by whole lengths."""
     return low + length * fraction((x - low) / length)

@@ -13,7 +13,7 @@ from pbrdf.kernels import jit
 PARALLEL = 1e-28
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, w_x, w_y, w_z):
     """Cosine and sine of twice the angle from axis s to axis w of a beam along k."""
     # e_p = k x e_s

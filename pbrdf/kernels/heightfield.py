@@ -73,7 +73,7 @@ def steepest_slope(heights, periodic, pitch_x, pitch_y):
     return math.sqrt(largest)
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def cell_counts(terrain):
     """Count the cells along x and y."""
     nx, ny = terrain.heights.shape
@@ -82,7 +82,7 @@ def cell_counts(terrain):
     return nx - 1, ny - 1
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def corner_heights(heights, i, j, periodic):
     """Heights of the corners (i, j), (i+1, j), (i, j+1), (i+1, j+1) of a cell."""
     i1 = i + 1
@@ -95,7 +95,7 @@ def corner_heights(heights, i, j, periodic):
     return heights[i, j], heights[i1, j], heights[i, j1], heights[i1, j1]
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def facet_steps(terrain, i, j, facet):
     """Height step per cell along x and y on one facet of cell (i, j)."""
     z00, z10, z01, z11 = corner_heights(terrain.heights, i, j, terrain.periodic)
@@ -104,14 +104,14 @@ def facet_steps(terrain, i, j, facet):
     return z11 - z01, z01 - z00
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def facet_slopes(terrain, i, j, facet):
     """Slopes dz/dx and dz/dy of one facet of cell (i, j)."""
     step_x, step_y = facet_steps(terrain, i, j, facet)
     return step_x / terrain.pitch_x, step_y / terrain.pitch_y
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def plane_height(z00, z10, z01, z11, facet, u, v):
     """Height of one facet's plane at (u, v) of its cell, from the corner heights."""
     if facet == FACET_LOW:
@@ -119,7 +119,7 @@ def plane_height(z00, z10, z01, z11, facet, u, v):
     return z00 + (z11 - z01) * u + (z01 - z00) * v
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def zero_between(t_a, t_b, clear_a, clear_b):
     """Time at which a clearance that is linear between two times reaches zero."""
     return min(max(t_a + (t_b - t_a) * (clear_a / (clear_a - clear_b)), t_a), t_b)
@@ -142,7 +142,7 @@ def fall(heights, periodic, i, j, u, v, z, speed_z, t_limit):
 
 # One loop on purpose: every step decides between blocks, cells and facets, and a call in it
 # would cost as much as the step
-@jit(inline="always")
+@jit(forceinline=True)
 def walk_until(
     terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, t_limit, max_steps
 ):  # fmt: skip
@@ -292,7 +292,7 @@ def walk_until(
     return LOST, i, j, -1, u, v, z + speed_z * t, t
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, max_steps):
     """`walk_until` without a limit: (fate, i, j, facet, u, v, z)."""
     fate, i, j, facet, u, v, z, _ = walk_until(
@@ -302,7 +302,7 @@ def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, m
     return fate, i, j, facet, u, v, z
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def leave_facet(terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate, max_steps):
     """Follow a ray along the unit vector k from a facet to the next one it meets.
 

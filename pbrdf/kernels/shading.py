@@ -46,7 +46,7 @@ def base_strength(albedo, n, kappa):
     return albedo / (n * n * (1.0 - albedo * internal_reflectance(n, kappa)))
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def reflect_once(a, b, c, d, c_in, s_in, c_out, s_out, n_stokes, mueller):
     """Mueller matrix R(out) F(beta) R(in) of a path with one bounce, paper eq. (16)."""
     mueller[0, 0] = a
@@ -70,7 +70,46 @@ def reflect_once(a, b, c, d, c_in, s_in, c_out, s_out, n_stokes, mueller):
         mueller[3, 3] = c
 
 
-@jit(inline="always")
+@jit(forceinline=True)
+def reflect_twice(
+    a1, b1, c1, d1, a2, b2, c2, d2, cos1, sin1, cos2, sin2, cos3, sin3, n_stokes, mueller
+):  # fmt: skip
+    """Mueller matrix R(3) F(beta_2) R(2) F(beta_1) R(1) of a path with two bounces."""
+    # Into the second facet's frame, and reflected by it
+    ca, cb = cos2 * a1, cos2 * b1
+    mueller[0, 0] = a2 * a1 + b2 * cb
+    if n_stokes == 1:
+        return
+    sa, sb, cc, cd = sin2 * a1, sin2 * b1, cos2 * c1, cos2 * d1
+    sc, sd = sin2 * c1, sin2 * d1
+    y01, y02 = a2 * b1 + b2 * ca, b2 * sc
+    y10, y11, y12 = b2 * a1 + a2 * cb, b2 * b1 + a2 * ca, a2 * sc
+    y20, y21, y22 = -c2 * sb, -c2 * sa, c2 * cc - d2 * d1
+    # Out of the second frame into the exit frame, into the first from the source's
+    z10, z20 = cos3 * y10 + sin3 * y20, cos3 * y20 - sin3 * y10
+    z11, z21 = cos3 * y11 + sin3 * y21, cos3 * y21 - sin3 * y11
+    z12, z22 = cos3 * y12 + sin3 * y22, cos3 * y22 - sin3 * y12
+    mueller[0, 1] = cos1 * y01 - sin1 * y02
+    mueller[0, 2] = sin1 * y01 + cos1 * y02
+    mueller[1, 0] = z10
+    mueller[1, 1] = cos1 * z11 - sin1 * z12
+    mueller[1, 2] = sin1 * z11 + cos1 * z12
+    mueller[2, 0] = z20
+    mueller[2, 1] = cos1 * z21 - sin1 * z22
+    mueller[2, 2] = sin1 * z21 + cos1 * z22
+    if n_stokes == 4:
+        y13, y23 = -a2 * sd, -c2 * cd - d2 * c1
+        y31, y32 = -d2 * sa, d2 * cc + c2 * d1
+        mueller[0, 3] = -b2 * sd
+        mueller[1, 3] = cos3 * y13 + sin3 * y23
+        mueller[2, 3] = cos3 * y23 - sin3 * y13
+        mueller[3, 0] = -d2 * sb
+        mueller[3, 1] = cos1 * y31 - sin1 * y32
+        mueller[3, 2] = sin1 * y31 + cos1 * y32
+        mueller[3, 3] = c2 * c1 - d2 * cd
+
+
+@jit(forceinline=True)
 def reflect_column(a, b, c, d, column, mueller):
     """One column of a matrix after Fresnel reflection, paper eq. (10)."""
     i = mueller[0, column]
@@ -83,7 +122,7 @@ def reflect_column(a, b, c, d, column, mueller):
     mueller[3, column] = d * u + c * v
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def scatter_column(strength, a_in, b_in, a_out, b_out, column, mueller):
     """One column after the base: in through the interface, depolarised, out through it."""
     inside = strength * (a_in * mueller[0, column] + b_in * mueller[1, column])
@@ -125,7 +164,7 @@ def reflect_often(record, ray, bounces, w, optics, n_stokes, mueller):
                 scatter_column(base[w, m], a_in, b_in, a_out, b_out, column, mueller)
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def path_mueller(record, ray, bounces, w, optics, n_stokes, mueller):
     """Mueller matrix of a path, by the closed form where it has one mirror reflection."""
     if bounces == 1 and record[0, ray, COS_OUT] == SPECULAR:
@@ -137,11 +176,34 @@ def path_mueller(record, ray, bounces, w, optics, n_stokes, mueller):
             a, b, c, d, record[0, ray, TURN_C], record[0, ray, TURN_S],
             record[1, ray, TURN_C], record[1, ray, TURN_S], n_stokes, mueller,
         )  # fmt: skip
+    elif bounces == 2 and record[0, ray, COS_OUT] == SPECULAR == record[1, ray, COS_OUT]:
+        m = int(record[0, ray, LABEL])
+        a1, b1, c1, d1 = reflection_elements(
+            record[0, ray, COS_IN], optics.n[w, m], optics.kappa[w, m]
+        )
+        m = int(record[1, ray, LABEL])
+        a2, b2, c2, d2 = reflection_elements(
+            record[1, ray, COS_IN], optics.n[w, m], optics.kappa[w, m]
+        )
+        reflect_twice(
+            a1, b1, c1, d1, a2, b2, c2, d2,
+            record[0, ray, TURN_C], record[0, ray, TURN_S],
+            record[1, ray, TURN_C], record[1, ray, TURN_S],
+            record[2, ray, TURN_C], record[2, ray, TURN_S], n_stokes, mueller,
+        )  # fmt: skip
     else:
         reflect_often(record, ray, bounces, w, optics, n_stokes, mueller)
 
 
-@jit(inline="always")
+@jit(forceinline=True)
+def lost_energy(end):
+    """Column of the energy of a path that did not escape."""
+    if end == N_TRUNCATED:
+        return TRUNCATED
+    return SIDEWAYS if end == N_SIDE else LEAKED
+
+
+@jit(forceinline=True)
 def tally_path(
     end, record, ray, bounces, k_x, k_y, k_z, cos_phi_i, sin_phi_i, optics, tally
 ):  # fmt: skip
@@ -160,11 +222,7 @@ def tally_path(
             energy[w, ABSORBED] -= 1.0
         return
     if end != N_ESCAPED:
-        lost = LEAKED
-        if end == N_TRUNCATED:
-            lost = TRUNCATED
-        elif end == N_SIDE:
-            lost = SIDEWAYS
+        lost = lost_energy(end)
         for w in range(energy.shape[0]):
             path_mueller(record, ray, bounces, w, optics, 1, mueller)
             energy[w, ABSORBED] -= mueller[0, 0]

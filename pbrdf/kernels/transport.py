@@ -40,6 +40,7 @@ from pbrdf.kernels.shading import (
     TURN_S,
     tally_path,
 )
+from pbrdf.kernels.spectra import gather_path
 
 MAX_STEPS = 10_000_000
 # Smallest cosine of a hit: rounding may leave a grazing ray parallel to the facet it meets
@@ -50,7 +51,7 @@ W_I, W_J, W_FACET, W_U, W_V, W_Z, W_KX, W_KY, W_KZ = 0, 1, 2, 3, 4, 5, 6, 7, 8
 W_SX, W_SY, W_SZ, W_RATE, W_COS, W_BOUNCE, N_WAITING = 9, 10, 11, 12, 13, 14, 15
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def reflect(k_x, k_y, k_z, slope_x, slope_y):
     """Mirror direction at a facet, the facet's normal and the cosine of incidence."""
     length = math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
@@ -66,7 +67,7 @@ def reflect(k_x, k_y, k_z, slope_x, slope_y):
     return r_x * scale, r_y * scale, r_z * scale, n_x, n_y, n_z, cos_beta
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def bounce(k_x, k_y, k_z, s_x, s_y, s_z, slope_x, slope_y):
     """Reflect a beam and its frame at a facet.
 
@@ -89,7 +90,7 @@ def bounce(k_x, k_y, k_z, s_x, s_y, s_z, slope_x, slope_y):
     return r_x, r_y, r_z, s_x, s_y, s_z, leave_rate, cos_beta, c2, s2
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def exit_turn(k_x, k_y, k_z, s_x, s_y, s_z, cos_phi_i, sin_phi_i):
     """Turn of the frame to the meridian plane of the exit direction, e_s = z x k."""
     m_x = -k_y
@@ -137,10 +138,10 @@ def scatter(slope_x, slope_y, draw_a, draw_b):
     return k_x, k_y, k_z, s_x, s_y, s_z, cosine * length, cosine
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def trace_ray(
     terrain, fate, i, j, facet, u, v, z, cos_phi, sin_phi, source, number,
-    record, waiting, optics, tally,
+    record, waiting, spectra, optics, tally,
 ):  # fmt: skip
     """Follow a ray from its first meeting with the surface until all its light has left.
 
@@ -149,8 +150,10 @@ def trace_ray(
     labels = terrain.labels
     max_bounces = record.shape[0] - 1
     splits = optics.base.shape[1] > 0
-    for w in range(tally.energy.shape[0]):
-        tally.energy[w, ABSORBED] += 1.0
+    gathers = spectra.sums.size > 0
+    if not gathers:
+        for w in range(tally.energy.shape[0]):
+            tally.energy[w, ABSORBED] += 1.0
     tally.counts[N_SEGMENTS] += 1
     # The beam travels against dir_i; its frame has e_s horizontal
     k_x = -source.sin_theta * cos_phi
@@ -206,7 +209,15 @@ def trace_ray(
             end = N_SIDE
         elif fate == ESCAPED and bounces > 0:
             end = N_ESCAPED
-        tally_path(end, record, 0, bounces, k_x, k_y, k_z, cos_phi, sin_phi, optics, tally)
+        if gathers:
+            gather_path(
+                end, record, 0, bounces, k_x, k_y, k_z, cos_phi, sin_phi,
+                spectra, optics, tally,
+            )  # fmt: skip
+        else:
+            tally_path(
+                end, record, 0, bounces, k_x, k_y, k_z, cos_phi, sin_phi, optics, tally
+            )
         if n_waiting == 0:
             break
 
@@ -231,11 +242,12 @@ def trace_ray(
 
 
 @jit(allocates=False)
-def trace_batch(terrain, source, record, waiting, optics, tally):
+def trace_batch(terrain, source, record, waiting, spectra, optics, tally):
     """Trace rays of one incident direction and add their Mueller matrices to the tally.
 
     Every ray walks from its entry point in the top plane; see `sweep_batch`. `record`
-    (bounces + 1, 1, N_RECORD) and `waiting` (bounces, N_WAITING) are room to work in.
+    (bounces + 1, 1, N_RECORD) and `waiting` (bounces, N_WAITING) are room to work in. With
+    `Spectra` of some size the light is gathered there, to be shaded afterwards.
     """
     launch = source.launch
     for line in range(source.n_lines):
@@ -258,12 +270,12 @@ def trace_batch(terrain, source, record, waiting, optics, tally):
             )  # fmt: skip
             trace_ray(
                 terrain, fate, i, j, facet, u, v, z, cos_phi, sin_phi, source, first + ray,
-                record, waiting, optics, tally,
+                record, waiting, spectra, optics, tally,
             )  # fmt: skip
 
 
 @jit(allocates=False)
-def sweep_batch(terrain, source, record, waiting, optics, tally):
+def sweep_batch(terrain, source, record, waiting, spectra, optics, tally):
     """`trace_batch` over a periodic field, without a search for the first facets.
 
     The rays of a line travel in one vertical plane. There a ray is the line of constant
@@ -329,7 +341,7 @@ def sweep_batch(terrain, source, record, waiting, optics, tally):
                             terrain, HIT, i, j, facet, u_a + share * (u_b - u_a),
                             v_a + share * (v_b - v_a), z_a + share * (z_b - z_a),
                             cos_phi, sin_phi, source, first + ray,
-                            record, waiting, optics, tally,
+                            record, waiting, spectra, optics, tally,
                         )  # fmt: skip
                         ray += 1
                         lag = length * ((ray + offset) / rays)

@@ -1,12 +1,15 @@
 """What is traced over one surface sample, and the tally that comes back."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from pbrdf.conventions import BOUNCES, detector_bins
 from pbrdf.kernels import shading
 from pbrdf.kernels.moments import add_sample
+from pbrdf.kernels.spectra import N_SUMS
+from pbrdf.tracer.spectra import WORTHWHILE, Spectrum
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +47,15 @@ class Plan:
     n_theta: int
     n_dphi: int
     skips: frozenset[str] = frozenset()
+
+    @cached_property
+    def spectrum(self) -> Spectrum | None:
+        """What many wavelengths over one set of paths share; None for few."""
+        if "spectra" not in self.skips or len(self.n) < WORTHWHILE:
+            return None
+        n_sums = 1 if self.n_stokes == 1 else N_SUMS
+        shape = (self.n_theta, self.n_dphi)
+        return Spectrum.of(self.n, self.kappa, self.theta_i, shape, n_sums=n_sums)
 
     @property
     def tally_shape(self) -> tuple[int, ...]:

@@ -11,6 +11,7 @@ SKIPS = {
     "walk": "rays over a height field need no mesh and no tree: an exact walk follows them",
     "sweep": "first hits on a periodic surface need no search: one pass a line finds them",
     "steep": "a ray that rises more steeply than every facet is not traced",
+    "spectra": "many wavelengths: single bounces are summed by bin and shaded once a bin",
 }
 
 

@@ -7,11 +7,13 @@ import numpy as np
 from pbrdf.kernels import shading
 from pbrdf.kernels.binning import bin_edges
 from pbrdf.kernels.entry import Source
+from pbrdf.kernels.spectra import shade_gathered
 from pbrdf.kernels.transport import N_WAITING, sweep_batch, trace_batch
 from pbrdf.surface.heightmap import HeightMap
 from pbrdf.tracer.embree import EmbreeField, trace_waves
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.plan import Plan, Tally
+from pbrdf.tracer.spectra import NOTHING
 
 
 def prepare(surface: HeightMap, skips: frozenset[str]) -> Field | EmbreeField:
@@ -52,9 +54,13 @@ def trace_sample(
         )  # fmt: skip
         if isinstance(target, EmbreeField):
             trace_waves(target, source, plan.max_bounces, optics, bins)
-        elif field.periodic and "sweep" in plan.skips:
-            # One pass along each line of entry points finds all first facets
-            sweep_batch(field.terrain, source, record, waiting, optics, bins)
-        else:
-            trace_batch(field.terrain, source, record, waiting, optics, bins)
+            continue
+        shared = plan.spectrum
+        light = shared.room(index, plan.max_bounces) if shared else NOTHING
+        # One pass along each line of entry points finds all first facets
+        sweeps = field.periodic and "sweep" in plan.skips
+        batch = sweep_batch if sweeps else trace_batch
+        batch(field.terrain, source, record, waiting, light, optics, bins)
+        if shared:
+            shade_gathered(plan.n_rays, light, optics, bins)
     return tally
