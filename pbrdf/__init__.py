@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from pbrdf import materials
     from pbrdf.analytic import MicrofacetModel
     from pbrdf.errors import AccuracyWarning, DataFileError
+    from pbrdf.observation import observe
     from pbrdf.optics.materials import Material
     from pbrdf.scene import Scene, load_scene
     from pbrdf.simulation import simulate
@@ -38,6 +39,7 @@ __all__ = [
     "Spheres",
     "load_scene",
     "materials",
+    "observe",
     "simulate",
 ]
 
@@ -54,6 +56,7 @@ _HOME = {
     "Scene": "pbrdf.scene",
     "Spheres": "pbrdf.surface",
     "load_scene": "pbrdf.scene",
+    "observe": "pbrdf.observation",
     "simulate": "pbrdf.simulation",
 }
 
