@@ -152,7 +152,10 @@ def part_inside(r_a, s_a, r_b, s_b):
 def azimuth_share(
     heights, periodic, pitch_x, pitch_y, slabs, x, y, z, k_x, k_y, reach
 ):  # fmt: skip
-    """Volume above the surface and wetted area of a body, per radian of azimuth."""
+    """Volume above the surface and wetted area of a body, per radian of azimuth.
+
+    Returns them and the distance of the outermost wetted point.
+    """
     # Distances at which the ray meets the next line of the grid: x, y and diagonal
     per_x = pitch_x / abs(k_x) if k_x != 0.0 else FAR
     per_y = pitch_y / abs(k_y) if k_y != 0.0 else FAR
@@ -170,6 +173,7 @@ def azimuth_share(
     top = slabs[slabs.shape[0] - 1, HIGH]
     volume = moment_below(slabs, top) if s_a < top else 0.0
     wetted = 0.0
+    outermost = 0.0
     while r_a < reach:
         r_b = min(min(next_x, next_y), min(next_d, reach))
         if next_x <= r_b:
@@ -188,6 +192,7 @@ def azimuth_share(
             moment, area = part_inside(r_a, s_a, r_b, s_b)
             volume += moment
             wetted += area
+            outermost = r_b
         elif inside or still:
             share = profile_crossing(slabs, r_a, s_a, r_b, s_b)
             r = r_a + (r_b - r_a) * share
@@ -195,9 +200,11 @@ def azimuth_share(
             if inside:
                 moment, area = part_inside(r_a, s_a, r, s)
                 volume -= moment_below(slabs, s)
+                outermost = r
             else:
                 moment, area = part_inside(r, s, r_b, s_b)
                 volume += moment_below(slabs, s)
+                outermost = r_b
             volume += moment
             wetted += area
         else:
@@ -214,8 +221,9 @@ def azimuth_share(
                 moment, area = part_inside(r_in, s_in, r_out, s_out)
                 volume += moment + moment_below(slabs, s_in) - moment_below(slabs, s_out)
                 wetted += area
+                outermost = r_out
         r_a, s_a, inside = r_b, s_b, still
-    return volume, wetted
+    return volume, wetted, outermost
 
 
 @jit(allocates=False)
@@ -223,20 +231,23 @@ def volume_above(heights, periodic, pitch_x, pitch_y, z_min, slabs, x, y, z, azi
     """Volume of a body above the surface and the area it wets, seen from above.
 
     (x, y) is its axis, z its reference height and z_min the lowest point of the surface.
+    Returns them and the distance from the axis to the outermost wetted point.
     """
     reach = widest_above(slabs, z_min - z) * (1.0 + 1e-12)
     volume = 0.0
     wetted = 0.0
+    outermost = 0.0
     step = 2.0 * math.pi / azimuths
     for k in range(azimuths):
         k_x = math.cos((k + 0.5) * step)
         k_y = math.sin((k + 0.5) * step)
-        share, area = azimuth_share(
+        share, area, rim = azimuth_share(
             heights, periodic, pitch_x, pitch_y, slabs, x, y, z, k_x, k_y, reach
         )
         volume += share
         wetted += area
-    return volume * step, wetted * step
+        outermost = max(outermost, rim)
+    return volume * step, wetted * step, outermost
 
 
 @jit(allocates=False)
@@ -245,14 +256,15 @@ def settled_height(
 ):
     """Find the reference height in [low, high] at which `sunk` lies below the surface.
 
-    Returns the height, the volume above and the wetted area.
+    Returns the height, the volume above, the wetted area and its outermost distance.
     """
     whole = 2.0 * math.pi * moment_below(slabs, slabs[slabs.shape[0] - 1, HIGH])
     z = 0.5 * (low + high)
     volume = 0.0
     wetted = 0.0
+    rim = 0.0
     for _ in range(SOLVER_STEPS):
-        volume, wetted = volume_above(
+        volume, wetted, rim = volume_above(
             heights, periodic, pitch_x, pitch_y, z_min, slabs, x, y, z, azimuths
         )
         excess = (whole - volume) - sunk
@@ -266,7 +278,7 @@ def settled_height(
         z = z + excess / wetted if wetted > 0.0 else low
         if not low < z < high:
             z = 0.5 * (low + high)
-    return z, volume, wetted
+    return z, volume, wetted, rim
 
 
 @jit(allocates=False)
@@ -379,3 +391,35 @@ def filled_volume(heights, periodic, pitch_x, pitch_y, level):
             wet += share
     half = 0.5 * pitch_x * pitch_y
     return volume * half, wet * half
+
+
+@jit(allocates=False)
+def area_ratio(heights, periodic, pitch_x, pitch_y):
+    """Area of all facets over the area seen from above."""
+    nx = heights.shape[0] if periodic else heights.shape[0] - 1
+    ny = heights.shape[1] if periodic else heights.shape[1] - 1
+    total = 0.0
+    for i in range(nx):
+        for j in range(ny):
+            z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
+            g_x, g_y = (z10 - z00) / pitch_x, (z11 - z10) / pitch_y
+            total += math.sqrt(1.0 + g_x * g_x + g_y * g_y)
+            g_x, g_y = (z11 - z01) / pitch_x, (z01 - z00) / pitch_y
+            total += math.sqrt(1.0 + g_x * g_x + g_y * g_y)
+    return total / (2.0 * nx * ny)
+
+
+@jit(allocates=False)
+def steep_share(heights, periodic, pitch_x, pitch_y, slope):
+    """Share of the facets, by area seen from above, that are steeper than a slope."""
+    nx = heights.shape[0] if periodic else heights.shape[0] - 1
+    ny = heights.shape[1] if periodic else heights.shape[1] - 1
+    count = 0
+    for i in range(nx):
+        for j in range(ny):
+            z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
+            g_x, g_y = (z10 - z00) / pitch_x, (z11 - z10) / pitch_y
+            count += g_x * g_x + g_y * g_y > slope * slope
+            g_x, g_y = (z11 - z01) / pitch_x, (z01 - z00) / pitch_y
+            count += g_x * g_x + g_y * g_y > slope * slope
+    return count / (2.0 * nx * ny)

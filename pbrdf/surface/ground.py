@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -15,6 +16,19 @@ AZIMUTHS_PER_CELL = 2.0
 FEWEST, MOST = 64, 1024
 # A body that floats free has this share of its size to the surface
 TOUCH = 1e-12
+
+
+class Rest(NamedTuple):
+    """A body at rest.
+
+    Height of its plane [um], volume above the surface [um³], wetted area as seen from
+    above [um²] and the distance of its outermost point from the axis [um].
+    """
+
+    z: float
+    volume: float
+    wetted: float
+    rim: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +67,15 @@ class Ground:
         length_x, length_y = self.surface.size
         return length_x * length_y
 
+    @cached_property
+    def wenzel_factor(self) -> float:
+        """True area of the facets over the area seen from above. [1]"""
+        return float(clipping.area_ratio(*self._grid))
+
+    def steep_share(self, slope: float) -> float:
+        """Share of the surface that is steeper than a slope. [1]"""
+        return float(clipping.steep_share(*self._grid, slope))
+
     @property
     def _grid(self) -> tuple[np.ndarray, bool, float, float]:
         return self.surface.heights, self.surface.periodic, *self.surface.spacing
@@ -73,39 +96,32 @@ class Ground:
 
     def volume_above(
         self, shape: Shape, x: float, y: float, z: float, azimuths: int | None = None
-    ) -> tuple[float, float]:
-        """Volume [um³] of a body above the surface, and the area [um²] that it wets.
-
-        z is where the plane of the shape lies; seen from above, the wetted area is a
-        projected one.
-        """
+    ) -> Rest:
+        """Measure a body whose plane lies at height z [um] about the axis (x, y)."""
         count = self.azimuths(shape.radius) if azimuths is None else azimuths
-        volume, wetted = clipping.volume_above(
-            *self._grid, self.lowest, shape.slabs, x, y, z, count
-        )
-        return float(volume), float(wetted)
+        found = clipping.volume_above(*self._grid, self.lowest, shape.slabs, x, y, z, count)
+        return Rest(z, *map(float, found))
 
-    def settle(self, shape: Shape, x: float, y: float) -> tuple[float, float, float]:
-        """Find the height [um] of a shape's plane at which its volume above is true.
+    def settle(self, shape: Shape, x: float, y: float) -> Rest:
+        """Lay a drop about the axis (x, y), with its volume above the surface true.
 
-        The body keeps its size, and with it the volume that is cut off below: only the
-        mean plane under a drop is replaced by the surface. Returns the height, the volume
-        above and the wetted area.
+        The body keeps its size, and with it the volume that is cut off below: the mean
+        plane under the drop is where both are as on a plane.
         """
         if self.flat:
-            return self.lowest, shape.volume, np.pi * shape.base_radius**2
+            wetted = np.pi * shape.base_radius**2
+            return Rest(self.lowest, shape.volume, wetted, shape.base_radius)
         if shape.sunk_volume <= TOUCH * shape.volume:
             radius = 0.5 * (shape.height - shape.bottom)
             z = self.rest(x, y, radius) - 0.5 * (shape.height + shape.bottom)
-            return z, shape.volume, 0.0
-        # The plane of the drop lies between the lowest and the highest point, unless the
-        # surface is steep enough to pierce it
+            return Rest(z, shape.volume, 0.0, 0.0)
+        # The plane of the drop lies between the lowest and the highest point
         margin = 1e-6 * shape.height
-        z, volume, wetted = clipping.settled_height(
+        found = clipping.settled_height(
             *self._grid, self.lowest, shape.slabs, x, y, shape.sunk_volume,
             self.lowest - margin, self.highest + margin, self.azimuths(shape.radius),
         )  # fmt: skip
-        return float(z), float(volume), float(wetted)
+        return Rest(*map(float, found))
 
     def fill_level(self, thickness: float) -> tuple[float, float]:
         """Level [um] of liquid of a mean thickness in the valleys, and the share wet."""

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import minimize_scalar
 
 from pbrdf.kernels.clipping import moment_below, radius_squared, widest_above
 
@@ -110,3 +111,27 @@ def seen_radius(radius: npt.ArrayLike, contact_angle: npt.ArrayLike) -> np.ndarr
     )  # fmt: skip
     seen: np.ndarray = np.asarray(radius) * sine
     return seen
+
+
+def contact_depth(one: Shape, other: Shape, rise: float) -> float:
+    """Distance of the axes at which two bodies touch, the other one higher by `rise`. [um]
+
+    The largest sum of both radii at one height. Radii of convex bodies are concave
+    functions of the height, so that there is one maximum.
+    """
+    low = max(one.bottom, other.bottom + rise)
+    high = min(one.height, other.height + rise)
+    if low >= high:
+        return 0.0
+
+    def apart(height: float) -> float:
+        squares = (
+            radius_squared(one.slabs, height),
+            radius_squared(other.slabs, height - rise),
+        )
+        return -float(sum(np.sqrt(max(square, 0.0)) for square in squares))
+
+    found = minimize_scalar(
+        apart, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * (high - low)}
+    )
+    return -float(found.fun)
