@@ -126,7 +126,7 @@ class Ground:
     def fill_level(self, thickness: float) -> tuple[float, float]:
         """Level [um] of liquid of a mean thickness in the valleys, and the share wet."""
         area = self.area
-        low, high = self.lowest, self.highest + thickness
+        low, high = self.lowest, self.highest + 2.0 * thickness
 
         def excess(level: float) -> float:
             volume, _ = clipping.filled_volume(*self._grid, level)
