@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import lru_cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,7 +32,8 @@ class AnalyticModel:
         True if slope_rms_x and slope_rms_y are to be told apart.
     """
 
-    first_order: frozenset[str] = frozenset()
+    bounds: Mapping[str, tuple[float, float]] = MappingProxyType({})
+    replicas: tuple["AnalyticModel", ...] = ()
 
     def __init__(self, model: "MicrofacetModel", *, split_slope: bool = False) -> None:
         self.model = model

@@ -66,10 +66,13 @@ def assemble(
     others = {**held, **known, **question.bounds}
     _check_names(adapter, observations.geometry, free, others)
     layout = Layout.of(free, observations, question.separate)
-    _check_separate(adapter, question.separate)
     parameters = _parameters(adapter, observations, layout, question.bounds, known)
     prediction = predict(
         adapter, observations, layout, fixed=held, aperture=question.aperture
+    )
+    replicas = tuple(
+        predict(one, observations, layout, fixed=held, aperture=question.aperture)
+        for one in adapter.replicas
     )
     start = np.array([parameter.value for parameter in parameters])
     predicted = prediction.function(start).full().ravel()
@@ -97,6 +100,7 @@ def assemble(
                 aperture=question.aperture,
                 seed=question.seed,
                 objective=objective,
+                replicas=replicas,
             )
         )
     return problems, {name: known[name][1] for name in outside}
@@ -174,14 +178,6 @@ def _check_names(
                 raise ValueError(msg)
 
 
-def _check_separate(model: MuellerModel, separate: Iterable[str]) -> None:
-    """Reject separate values of what is simulated once for all scans."""
-    for name in separate:
-        if name in model.first_order:
-            msg = f"separate must not name {name!r}, which this simulated model shares."
-            raise ValueError(msg)
-
-
 def _parameters(
     model: MuellerModel,
     observations: Observations,
@@ -201,12 +197,32 @@ def _parameters(
         start = float(np.median(values))
         if name in known:
             start = known[name][0]
-        parameter = bounded_parameter(name, start, bounds.get(name), label=label)
+        limits = _within(name, bounds.get(name), model.bounds.get(name))
+        parameter = bounded_parameter(name, start, limits, label=label)
         if name in known:
             value, stderr = known[name]
             parameter = replace(parameter, prior_value=value, prior_stderr=stderr)
         parameters.append(_off_bounds(parameter))
     return tuple(parameters)
+
+
+def _within(
+    name: str,
+    wanted: tuple[float | None, float | None] | None,
+    valid: tuple[float, float] | None,
+) -> tuple[float | None, float | None] | None:
+    """Return the bounds asked for, if the model holds there; by default where it does."""
+    if valid is None or wanted is None:
+        return wanted or valid
+    low, high = (v if w is None else w for w, v in zip(wanted, valid, strict=True))
+    if low < valid[0] or high > valid[1]:
+        msg = (
+            f"bounds of {name} must lie in [{valid[0]:g}, {valid[1]:g}], for which the "
+            f"model was made, got ({low:g}, {high:g}). Give SimulatedModel a wider "
+            "index_range."
+        )
+        raise ValueError(msg)
+    return low, high
 
 
 def _off_bounds(parameter: Parameter) -> Parameter:

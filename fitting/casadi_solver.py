@@ -89,7 +89,7 @@ def _solve_ipopt(objective: Objective, max_iterations: int, passes: int) -> Solu
     Where the exact Hessian leads nowhere better, the Gauss-Newton one, which never bends
     the wrong way, gets a try before the search ends.
     """
-    start, exact = objective.start, objective.prediction.second_order
+    start = objective.start
     best = Solution(
         x=start,
         cost=objective.cost(start),
@@ -98,7 +98,7 @@ def _solve_ipopt(objective: Objective, max_iterations: int, passes: int) -> Solu
         solver="casadi/ipopt",
         n_evaluations=0,
     )
-    scale, count, gauss_newton = objective.sizes(start), 0, not exact
+    scale, count, gauss_newton = objective.sizes(start), 0, False
     for attempt in range(passes):
         solver = _ipopt(objective, max_iterations, gauss_newton=gauss_newton)
         found, evaluations = _pass(objective, solver, best, scale)

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 if TYPE_CHECKING:
-    from fitting.simulated_curve import SimulatedCurve
+    from fitting.simulated_model import SimulatedModel
     from pbrdf import MicrofacetModel
 
 __all__ = ["plane_curves"]
@@ -17,7 +17,7 @@ def plane_curves(
     theta_s: np.ndarray,
     *,
     analytic: "MicrofacetModel",
-    monte_carlo: "SimulatedCurve | None" = None,
+    monte_carlo: "SimulatedModel | None" = None,
 ) -> xr.Dataset:
     """Return M00, M10 and DOLP of the models against incidence and signed view angle.
 
@@ -29,7 +29,7 @@ def plane_curves(
         Rising exit zeniths above 0, shown on both sides of the normal. [rad]
     analytic : MicrofacetModel
         The analytical model.
-    monte_carlo : SimulatedCurve, optional
+    monte_carlo : SimulatedModel, optional
         The simulated one.
 
     Returns
@@ -42,10 +42,7 @@ def plane_curves(
     where = angles[0], np.abs(angles[1]), np.where(angles[1] > 0.0, np.pi, 0.0)
     values = _named("analytic", analytic.brdf(*where))
     if monte_carlo is not None:
-        flat = [angle.ravel() for angle in where]
-        shape = (*angles[0].shape, 4, 4)
-        simulated = monte_carlo.brdf(*flat).reshape(shape)
-        error = monte_carlo.stderr(*flat).reshape(shape)
+        simulated, error = monte_carlo.brdf(*where), monte_carlo.stderr(*where)
         values |= _named("monte_carlo", simulated) | {
             "monte_carlo_M00_stderr": error[..., 0, 0],
             "monte_carlo_M10_stderr": error[..., 1, 0],

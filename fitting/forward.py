@@ -24,8 +24,12 @@ class MuellerModel(Protocol):
     """What the fit needs of a reflectance model, analytical or simulated."""
 
     @property
-    def first_order(self) -> frozenset[str]:
-        """Parameters by which only first derivatives exist; one value for all scans."""
+    def bounds(self) -> Mapping[str, tuple[float, float]]:
+        """Where the model holds, for parameters that it knows less of than others do."""
+
+    @property
+    def replicas(self) -> Sequence["MuellerModel"]:
+        """Equal models whose spread is the error of a simulation; none of an exact one."""
 
     def values(self, geometry: Geometry) -> Mapping[str, np.ndarray]:
         """Return the present value of every parameter at each geometry, shape (N,)."""
@@ -171,7 +175,7 @@ def predict(
 
     y = _readings(observations, linear)
     function = casadi.Function("reading", [x], [y])
-    return Prediction(function, second_order=not model.first_order & set(layout.base))
+    return Prediction(function)
 
 
 def _readings(observations: Observations, linear: Any) -> Any:

@@ -85,9 +85,8 @@ def profile_likelihood(
         msg = f"result must have a minimum to profile, got {result.status!r}. Fit again."
         raise ValueError(msg)
     problem = result.problem
-    if problem.objective.prediction.second_order:
-        # Dozens of fits: with exact Hessians each takes a few steps
-        problem = replace(problem, solver="casadi")
+    # Dozens of fits: with exact Hessians each takes a few steps
+    problem = replace(problem, solver="casadi")
     parameter = next(p for p in problem.parameters if p.name == name)
     best = np.array(list(result.values.values()))
     floor = problem.objective.cost(best)

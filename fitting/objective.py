@@ -82,12 +82,9 @@ class Prediction:
     ----------
     function : casadi.Function
         Maps x (n) to y (m).
-    second_order : bool
-        False if the function has first derivatives only, as a wrapped simulation.
     """
 
     function: "casadi.Function"
-    second_order: bool = True
 
     @cached_property
     def jacobian(self) -> "casadi.Function":
@@ -102,8 +99,6 @@ class Prediction:
         """True if y is an affine function of x, so the fit needs no search."""
         import casadi
 
-        if not self.second_order:
-            return False
         x = casadi.MX.sym("x", self.function.size1_in(0))
         weight = casadi.MX.sym("w", self.function.size1_out(0))
         gradient = casadi.gradient(casadi.dot(weight, self.function(x)), x)

@@ -84,6 +84,8 @@ class Problem:
         Seed of the global search.
     objective : Objective
         What the solver sees.
+    replicas : tuple of Prediction
+        What each independent part of a simulation predicts; none of an exact model.
     """
 
     model: MuellerModel
@@ -98,6 +100,19 @@ class Problem:
     aperture: Aperture | None
     seed: int
     objective: Objective
+    replicas: tuple[Prediction, ...] = ()
+
+    def simulation_error(self, x: np.ndarray) -> np.ndarray:
+        """Return what the simulation errs in the readings, shape (G, m).
+
+        Row g is how far group g of the simulation lies from the mean, over sqrt(G (G - 1)),
+        so that the squares of a column sum to the variance of a predicted reading.
+        """
+        count = len(self.replicas)
+        if not count:
+            return np.zeros((0, len(self.objective.data)))
+        groups = np.stack([one.function(x).full().ravel() for one in self.replicas])
+        return np.asarray((groups - groups.mean(axis=0)) / np.sqrt(count * (count - 1)))
 
     def predict(
         self, observations: Observations | None = None, layout: Layout | None = None
@@ -141,7 +156,8 @@ class Problem:
         if after is not None:
             objective = after.objective.started_at(after.solution.x)
         weights = self.weights
-        changes = weights.iterates or weights.n_estimated > 0
+        estimates = weights.n_estimated > 0
+        changes = weights.iterates or estimates or bool(self.replicas)
         m00 = self.m00().function if weights.iterates else None
         stderr = objective.stderr
         count = 0 if after is None else after.solution.n_evaluations
@@ -195,6 +211,10 @@ class Problem:
         shape = self.weights.shape(brightness)
         # A reading where the model is dark still has some noise
         shape = np.maximum(shape, 1e-6 * np.median(shape))
+        if self.replicas:
+            # What is estimated from the misfit holds the error of the simulation already
+            error = np.linalg.norm(self.simulation_error(solution.x), axis=0)
+            shape = np.where(self.weights.group < 0, np.hypot(shape, error), shape)
         if self.weights.n_estimated == 0:
             return shape
         residual = objective.predict(solution.x) - objective.data

@@ -97,17 +97,21 @@ def _robust(objective: Objective, x: np.ndarray, found: Information) -> Informat
 def _with_uncertain(
     problem: Problem, solved: Solved, found: Information, uncertain: Mapping[str, float]
 ) -> tuple[np.ndarray, dict[str, dict[str, float]]]:
-    """Add the uncertainty of fixed parameters to the covariance, and keep account of it.
+    """Add what is uncertain beside the noise to the covariance, and keep account of it.
 
     With free parameters x and a fixed one b the minimum moves by
     dx/db = -(J^T J)^-1 J^T (dr/db), so b's variance adds (dx/db) var(b) (dx/db)^T.
     """
     labels = problem.layout.labels
-    covariance = found.covariance.copy()
-    parts = {name: {"noise": float(found.stderr[i])} for i, name in enumerate(labels)}
+    x, objective = solved.solution.x, solved.objective
+    noise, simulation = _without_simulation(problem, solved, found)
+    covariance = noise + simulation
+    parts = {name: {"noise": float(np.sqrt(noise[i, i]))} for i, name in enumerate(labels)}
+    if problem.replicas:
+        for i, label in enumerate(labels):
+            parts[label]["simulation"] = float(np.sqrt(simulation[i, i]))
     if not uncertain:
         return covariance, parts
-    x, objective = solved.solution.x, solved.objective
     n = len(labels)
     column = {
         name: np.full(problem.observations.geometry.size, n + i)
@@ -128,6 +132,26 @@ def _with_uncertain(
         for label, shift in zip(labels, moved, strict=True):
             parts[label][name] = float(abs(shift))
     return covariance, parts
+
+
+def _without_simulation(
+    problem: Problem, solved: Solved, found: Information
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the covariance that the noise of the readings causes, and the simulation's.
+
+    The weights count the simulation's error as if each reading had its own. In truth
+    neighbours err together, so that part is taken out again and replaced by the spread of
+    the parameters over the independent groups of the simulation.
+    """
+    if not problem.replicas:
+        return found.covariance, np.zeros_like(found.covariance)
+    x, objective = solved.solution.x, solved.objective
+    error = problem.simulation_error(x) / objective.stderr
+    share = np.minimum((error**2).sum(axis=0), 1.0)
+    to_parameters = np.nan_to_num(found.covariance, posinf=0.0) @ objective.jacobian(x).T
+    moved = to_parameters @ error.T
+    counted = (to_parameters * share) @ to_parameters.T
+    return found.covariance - counted, moved @ moved.T
 
 
 def _models(problem: Problem, x: np.ndarray) -> dict[str, object]:

@@ -1,73 +1,182 @@
-"""A simulated surface in the fit's loop: the specular curve comes from traced paths.
+"""A simulated surface in the fit's loop: the analytical model, corrected by traced paths.
 
-Over an opaque surface the paths of the light do not depend on the index. Traced once, they
-are shaded again for each n and kappa that the solver asks for, with every bounce. Gain and
-diffuse albedo stay linear, outside the simulation.
+    M(n, kappa, ...) = analytical model with specular_gain * ratio
+                       + specular_gain * light of several bounces(n, kappa),
+
+where the ratio, for each direction, and the light of several bounces come from one Monte
+Carlo run (`fitting.simulated_trace`). Nothing is traced again while the solver varies n,
+kappa and gains. The slope may vary too, near the one traced: the analytical curve follows
+it, the correction stays.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fitting.analytic_model import AnalyticModel
+from fitting.index_grid import IndexGrid, Range
 from fitting.observations import Geometry
-from fitting.parameters import PARAMETERS
+from fitting.simulated_trace import Trace, group_count, trace
+from pbrdf import HeightMap, Material, MicrofacetModel, Scene
 
 if TYPE_CHECKING:
     import casadi
+    import xarray as xr
 
 __all__ = ["SimulatedModel"]
 
-Shade = Callable[[Geometry, Mapping[str, float]], np.ndarray]
+# Up to this kappa a material is taken for a dielectric
+_WEAK = 1.0
+_DIELECTRIC: tuple[Range, Range] = ((1.15, 2.6), (0.0, 1.5))
+
+Key = tuple[float, float | None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Run:
+    """How to trace, and what has been traced: shared by all models of one surface."""
+
+    scene: Scene
+    grid: IndexGrid
+    index: tuple[float, float]
+    companion: MicrofacetModel
+    options: Mapping[str, Any]
+    traces: dict[Key, Trace] = field(default_factory=dict)
+    datasets: "dict[Key, xr.Dataset]" = field(default_factory=dict)
+
+    def key(self, theta_i: float, phi_i: float) -> Key:
+        isotropic = getattr(self.scene.surface, "isotropic", False)
+        return round(theta_i, 9), None if isotropic else round(phi_i, 9)
+
+    def of(self, keys: Sequence[Key]) -> list[Trace]:
+        """Return the traces of these source directions; run what is missing."""
+        missing = [key for key in dict.fromkeys(keys) if key not in self.traces]
+        for phi_i in dict.fromkeys(phi_i for _, phi_i in missing):
+            here = [key for key in missing if key[1] == phi_i]
+            traces, dataset = trace(
+                self.scene,
+                [theta_i for theta_i, _ in here],
+                self.grid,
+                index=self.index,
+                companion=self.companion,
+                phi_i=phi_i,
+                **self.options,
+            )
+            for position, (key, found) in enumerate(zip(here, traces, strict=True)):
+                self.traces[key] = found
+                self.datasets[key] = dataset.isel(theta_i=[position])
+        return [self.traces[key] for key in keys]
 
 
 class SimulatedModel:
-    """Reflectance = specular_gain * simulated curve + Lambertian term of diffuse_albedo.
+    """Mueller BRDF of a simulated surface with the parameters of the analytical model.
+
+    The first question about an incidence traces it; every later one, and every model made
+    from this one, uses the same paths. The error of the simulation goes into the weights of
+    a fit and, as its own part, into the standard errors.
 
     Parameters
     ----------
-    shade : callable
-        (geometry, values) -> BRDF of the simulation at the N geometries, shape (N, 4, 4),
-        smooth in the values. [1/sr]
-    parameters : mapping of str to float
-        Present values of what `shade` depends on, as n and kappa.
-    specular_gain, diffuse_albedo : float
-        Present values of the linear parameters.
-    derivative : callable, optional
-        (geometry, values, name) -> derivative of the curve by one parameter, (N, 4, 4).
-        Without it, central differences of `shade`.
+    scene : Scene
+        Opaque surface of one material. Its index is where a fit starts.
+    model : MicrofacetModel, optional
+        Start values of gains, diffuse terms and index; its slope and shadowing are the
+        analytical model's that the simulation corrects. Default: unit gain, the scene's
+        index, and its slope.
+    index_range : ((n, n), (kappa, kappa)), optional
+        Lowest and highest index that a fit may ask for. Default: n in 1.15 .. 2.6 and kappa
+        in 0 .. 1.5 for a dielectric, about half to twice its constants for a metal. Two
+        equal values hold the index, and trace it alone. [1]
+    n_rays, realizations, seed, workers, n_theta, n_dphi, stokes, progress
+        Of the simulation, see `pbrdf.simulate`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If the scene is none that keeps its paths when the index changes, or the index lies
+        outside `index_range`.
+
+    Examples
+    --------
+    >>> from pbrdf import GaussianSurface
+    >>> surface = GaussianSurface(
+    ...     shape=(256, 256), spacing=1.0, corr_length=12.0, slope_rms=0.3
+    ... )
+    >>> model = SimulatedModel(Scene(surface, "bk7"))  # doctest: +SKIP
+    >>> fit(scan, model, free=("n", "kappa", "specular_gain"))  # doctest: +SKIP
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913  (the choices of a simulation)
         self,
-        shade: Shade,
-        parameters: Mapping[str, float],
+        scene: Scene,
+        model: MicrofacetModel | None = None,
         *,
-        specular_gain: float = 1.0,
-        diffuse_albedo: float = 0.0,
-        derivative: Callable[[Geometry, Mapping[str, float], str], np.ndarray]
-        | None = None,
+        index_range: tuple[Range, Range] | None = None,
+        n_rays: int = 10_000,
+        realizations: int = 160,
+        seed: int = 0,
+        workers: int | None = None,
+        n_theta: int = 45,
+        n_dphi: int = 36,
+        stokes: str = "full",
+        progress: Callable[[int, int], None] | None = None,
     ) -> None:
-        self.shade, self.derivative = shade, derivative
-        self.parameters = dict(parameters)
-        self.specular_gain, self.diffuse_albedo = specular_gain, diffuse_albedo
-        # CasADi does not own its callbacks: they must outlive every expression
-        self._callbacks: list[Any] = []
+        material = _opaque(scene)
+        if model is None:
+            model = MicrofacetModel(material, slope_rms=_slope(scene))
+        index = _index(model.material)
+        grid = IndexGrid(*(index_range or _range_around(index)))
+        for name, value, (low, high) in zip(
+            ("n", "kappa"), index, (grid.n, grid.kappa), strict=True
+        ):
+            if not low <= value <= high:
+                msg = (
+                    f"index_range must hold the model's {name} {value:g}, got {low:g} .. "
+                    f"{high:g}. Widen it."
+                )
+                raise ValueError(msg)
+        companion = model.with_parameters(
+            slope_rms=_slope(scene),
+            specular_gain=1.0,
+            diffuse_albedo=0.0,
+            volume_albedo=0.0,
+            grazing_albedo=0.0,
+        )
+        group_count(scene, realizations)
+        options = {
+            "n_rays": n_rays,
+            "realizations": realizations,
+            "seed": seed,
+            "workers": workers,
+            "n_theta": n_theta,
+            "n_dphi": n_dphi,
+            "stokes": stokes,
+            "progress": progress,
+        }
+        self.model = model
+        self._run = _Run(
+            scene=scene, grid=grid, index=index, companion=companion, options=options
+        )
+        self._group: int | None = None
+
+    # What the fit asks for: see `fitting.forward.MuellerModel`
 
     @property
-    def first_order(self) -> frozenset[str]:
-        """Parameters by which only first derivatives exist: those of the simulation."""
-        return frozenset(self.parameters)
+    def bounds(self) -> dict[str, Range]:
+        """The indices that were, or will be, traced."""
+        return {"n": self._run.grid.n, "kappa": self._run.grid.kappa}
+
+    @property
+    def replicas(self) -> "tuple[SimulatedModel, ...]":
+        """The same model from each of the independent groups of realisations alone."""
+        count = group_count(self._run.scene, self._run.options["realizations"])
+        return tuple(self._with(group=number) for number in range(count))
 
     def values(self, geometry: Geometry) -> dict[str, np.ndarray]:
         """Return every parameter at each geometry, shape (N,)."""
-        present = {
-            **self.parameters,
-            "specular_gain": self.specular_gain,
-            "diffuse_albedo": self.diffuse_albedo,
-        }
-        return {name: np.full(geometry.size, value) for name, value in present.items()}
+        return AnalyticModel(self.model).values(geometry)
 
     def mueller(
         self, values: Mapping[str, Any], geometry: Geometry, elements: Sequence[int]
@@ -75,113 +184,159 @@ class SimulatedModel:
         """Return elements of the BRDF, shape (E, N), numbered along the rows. [1/sr]"""
         import casadi
 
-        names = tuple(self.parameters)
-        inputs = [values[name][0, 0] for name in names]
-        if all(isinstance(value, casadi.DM) for value in inputs):
-            numbers = {n: float(v) for n, v in zip(names, inputs, strict=True)}
-            specular = casadi.DM(self.curve(geometry, numbers)[:, list(elements)].T)
-        else:
-            callback = _shading(self, geometry, names, tuple(elements))
-            self._callbacks.append(callback)
-            flat = callback(casadi.vertcat(*inputs))
-            specular = casadi.reshape(flat, len(elements), geometry.size)
-        gain, diffuse = values["specular_gain"], values["diffuse_albedo"]
-        lambertian = casadi.DM(
-            [1.0 / np.pi if element == 0 else 0.0 for element in elements]
-        )
-        return casadi.repmat(gain, len(elements), 1) * specular + lambertian @ diffuse
+        ratio, multiple = self._read(geometry)
+        gain = values["specular_gain"]
+        corrected = {**values, "specular_gain": gain * casadi.DM(ratio).T}
+        single = AnalyticModel(self.model).mueller(corrected, geometry, elements)
+        terms = casadi.vertcat(*self._run.grid.terms(values["n"], values["kappa"]))
+        rows = [
+            casadi.sum1(casadi.DM(multiple[:, element].T.copy()) * terms)
+            for element in elements
+        ]
+        return single + casadi.repmat(gain, len(elements), 1) * casadi.vertcat(*rows)
 
     def updated(self, values: Mapping[str, float]) -> "SimulatedModel":
-        """Return the model with these values."""
-        present = {
-            **self.parameters,
-            "specular_gain": self.specular_gain,
-            "diffuse_albedo": self.diffuse_albedo,
-            **values,
-        }
-        return SimulatedModel(
-            self.shade,
-            {name: present[name] for name in self.parameters},
-            specular_gain=present["specular_gain"],
-            diffuse_albedo=present["diffuse_albedo"],
-            derivative=self.derivative,
-        )
+        """Return the model with these values, on the same paths."""
+        return self._with(model=AnalyticModel(self.model).updated(values))
 
-    def curve(self, geometry: Geometry, values: Mapping[str, float]) -> np.ndarray:
-        """Return the simulated curve, shape (N, 16)."""
-        return np.asarray(self.shade(geometry, values), dtype=float).reshape(-1, 16)
+    # What a user asks for
 
-    def slope(
-        self, geometry: Geometry, values: Mapping[str, float], name: str
+    def brdf(
+        self,
+        theta_i: np.ndarray,
+        theta_s: np.ndarray,
+        dphi: np.ndarray,
+        *,
+        phi_i: np.ndarray | float = 0.0,
     ) -> np.ndarray:
-        """Return the derivative of the curve by one parameter, shape (N, 16)."""
-        if self.derivative is not None:
-            slope = self.derivative(geometry, values, name)
-            return np.asarray(slope, dtype=float).reshape(-1, 16)
-        low, high, scale, *_ = PARAMETERS.get(name, (-np.inf, np.inf, 1.0))
-        up = min(values[name] + 1e-4 * scale, high)
-        down = max(values[name] - 1e-4 * scale, low)
-        above = self.curve(geometry, {**values, name: up})
-        return (above - self.curve(geometry, {**values, name: down})) / (up - down)
+        """Return the Mueller BRDF at directions that broadcast, (..., 4, 4). [1/sr]"""
+        geometry, shape = _flat(theta_i, theta_s, dphi, phi_i)
+        return self._brdf(geometry).reshape(*shape, 4, 4)
+
+    def stderr(
+        self,
+        theta_i: np.ndarray,
+        theta_s: np.ndarray,
+        dphi: np.ndarray,
+        *,
+        phi_i: np.ndarray | float = 0.0,
+    ) -> np.ndarray:
+        """Return the standard error that the simulation leaves, (..., 4, 4). [1/sr]"""
+        geometry, shape = _flat(theta_i, theta_s, dphi, phi_i)
+        groups = np.stack([replica._brdf(geometry) for replica in self.replicas])
+        error = groups.std(axis=0, ddof=1) / np.sqrt(len(groups))
+        return np.asarray(error.reshape(*shape, 4, 4))
+
+    def simulation(self, theta_i: Iterable[float], phi_i: float = 0.0) -> "xr.Dataset":
+        """Return what was simulated at these incidences, for the index of the start."""
+        import xarray as xr
+
+        keys = [self._run.key(angle, phi_i) for angle in theta_i]
+        self._run.of(keys)
+        parts = [self._run.datasets[key] for key in keys]
+        return xr.concat(parts, "theta_i", data_vars="minimal", combine_attrs="override")
+
+    def _with(
+        self, *, model: MicrofacetModel | None = None, group: int | None = None
+    ) -> "SimulatedModel":
+        """Return a model of other values, or of one group, on the same paths."""
+        other = object.__new__(SimulatedModel)
+        other.model = self.model if model is None else model
+        other._run = self._run
+        other._group = self._group if group is None else group
+        return other
+
+    def _brdf(self, geometry: Geometry) -> np.ndarray:
+        """Return the Mueller BRDF, shape (N, 4, 4)."""
+        where = geometry.theta_i, geometry.theta_s, geometry.dphi
+        ratio, multiple = self._read(geometry)
+        n, kappa = _index(self.model.material)
+        gain = self.model.specular_gain
+        bare = self.model.with_parameters(
+            specular_gain=1.0, diffuse_albedo=0.0, volume_albedo=0.0, grazing_albedo=0.0
+        )
+        several = multiple @ self._run.grid.basis(n, kappa)
+        single = (ratio - 1.0)[:, None, None] * bare.brdf(*where, phi_i=geometry.phi_i)
+        whole = self.model.brdf(*where, phi_i=geometry.phi_i)
+        return np.asarray(whole + gain * (single + several.reshape(-1, 4, 4)))
+
+    def _read(self, geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
+        """Return the ratio (N,) and the coefficients (N, 16, K) at each geometry."""
+        keys = [
+            self._run.key(*angles)
+            for angles in zip(
+                geometry.theta_i.tolist(), geometry.phi_i.tolist(), strict=True
+            )
+        ]
+        ratio = np.empty(geometry.size)
+        multiple = np.empty((geometry.size, 16, len(self._run.grid.nodes)))
+        for key, found in dict(zip(keys, self._run.of(keys), strict=True)).items():
+            here = np.array([other == key for other in keys])
+            one = found.mean if self._group is None else found.groups[self._group]
+            ratio[here], multiple[here] = one.read(
+                geometry.theta_s[here], geometry.dphi[here]
+            )
+        return ratio, multiple
 
 
-def _shading(
-    model: SimulatedModel,
-    geometry: Geometry,
-    names: tuple[str, ...],
-    elements: tuple[int, ...],
-) -> "casadi.Callback":
-    """Return the curve as a CasADi function of the parameters, with its Jacobian."""
-    columns = list(elements)
-
-    def curve(point: tuple[float, ...]) -> np.ndarray:
-        values = dict(zip(names, point, strict=True))
-        return model.curve(geometry, values)[:, columns].ravel()
-
-    def jacobian(point: tuple[float, ...]) -> np.ndarray:
-        values = dict(zip(names, point, strict=True))
-        slopes = [model.slope(geometry, values, name)[:, columns].ravel() for name in names]
-        return np.stack(slopes, axis=1)
-
-    size, count = len(elements) * geometry.size, len(names)
-    slopes = _callback(jacobian, (count, size), (size, count))
-    return _callback(curve, (count,), (size, 1), slopes)
+def _flat(*directions: np.ndarray | float) -> tuple[Geometry, tuple[int, ...]]:
+    """Return directions in a row, and the shape they came in."""
+    theta_i, theta_s, dphi, phi_i = np.broadcast_arrays(
+        *(np.asarray(angle, dtype=float) for angle in directions)
+    )
+    unknown = np.full(theta_i.size, np.nan)
+    angles = theta_i.ravel(), theta_s.ravel(), dphi.ravel(), phi_i.ravel()
+    return Geometry(*angles, unknown), theta_i.shape
 
 
-def _callback(
-    function: Callable[[tuple[float, ...]], np.ndarray],
-    inputs: tuple[int, ...],
-    output: tuple[int, int],
-    derivative: "casadi.Callback | None" = None,
-) -> "casadi.Callback":
-    """Wrap a function of one point; a Jacobian is also handed the value there, unused."""
-    import casadi
+def _opaque(scene: Scene) -> Material:
+    """Return the material of a scene whose paths do not depend on its index."""
+    if not isinstance(scene, Scene):
+        msg = (
+            f"scene must be a Scene, got {type(scene).__name__}. Use Scene(surface, index)."
+        )
+        raise TypeError(msg)
+    material = scene.materials[0]
+    reason = ""
+    if len(scene.materials) > 1:
+        reason = "several materials"
+    elif scene.contaminants:
+        reason = "contaminants"
+    elif material.diffuse_albedo > 0.0:
+        reason = "a diffuse base under the interface"
+    if reason:
+        msg = (
+            f"scene must be a clean opaque surface of one material, got {reason}. Diffuse "
+            "light can be fitted as diffuse_albedo or volume_albedo."
+        )
+        raise ValueError(msg)
+    return material
 
-    # The solver asks for cost, gradient and Hessian at one point in turn
-    remembered = lru_cache(maxsize=8)(function)
 
-    class Wrapped(casadi.Callback):
-        def __init__(self) -> None:
-            casadi.Callback.__init__(self)
-            self.derivative = derivative
-            self.construct("simulated", {})
+def _slope(scene: Scene) -> float | tuple[float, float]:
+    """Return the rms slope of the facets, one number where the surface is isotropic."""
+    surface = scene.surface
+    if isinstance(surface, HeightMap):
+        x, y = (float(np.sqrt(np.mean(slope**2))) for slope in surface.slopes())
+    else:
+        x, y = surface.facet_slope_rms
+    if min(x, y) <= 0.0:
+        msg = "scene must have a rough surface to be fitted, got a flat one."
+        raise ValueError(msg)
+    return x if getattr(surface, "isotropic", False) else (x, y)
 
-        def get_n_in(self) -> int:
-            return len(inputs)
 
-        def get_sparsity_in(self, index: int) -> Any:
-            return casadi.Sparsity.dense(inputs[index], 1)
+def _index(material: Material) -> tuple[float, float]:
+    """Return the index, of a tabulated material that in the middle of its range."""
+    if not material.dispersive:
+        return material.index()
+    return material.index(0.5 * sum(material.valid_range))
 
-        def get_sparsity_out(self, index: int) -> Any:
-            return casadi.Sparsity.dense(*output)
 
-        def eval(self, arguments: Sequence[Any]) -> list[Any]:
-            return [casadi.DM(remembered(tuple(arguments[0].full().ravel().tolist())))]
-
-        def has_jacobian(self) -> bool:
-            return derivative is not None
-
-        def get_jacobian(self, *_: Any) -> Any:
-            return derivative
-
-    return Wrapped()
+def _range_around(index: tuple[float, float]) -> tuple[Range, Range]:
+    """Return the indices to be ready for."""
+    n, kappa = index
+    (low, high), absorbing = _DIELECTRIC
+    if kappa <= _WEAK:
+        return (min(low, n), max(high, n)), absorbing
+    return (0.4 * n, 2.5 * n), (0.5 * kappa, 1.7 * kappa)

@@ -1,0 +1,251 @@
+"""The Monte Carlo in the fit's loop: reading of the bins, any index, errors, recovery."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from numpy.testing import assert_allclose
+
+from fitting import SimulatedModel, fit
+from fitting.index_grid import IndexGrid
+from fitting.observations import Geometry
+from fitting.simulated_trace import interpolate_bins, merged
+from pbrdf import GaussianSurface, HeightMap, Material, MicrofacetModel, Scene, simulate
+from pbrdf.optics import specular_mueller
+
+THETA_I = 0.9
+SURFACE = GaussianSurface(shape=(64, 64), spacing=1.0, corr_length=8.0, slope_rms=0.3)
+FREE = ("n", "kappa", "specular_gain", "diffuse_albedo")
+
+
+@pytest.fixture(scope="module")
+def model() -> SimulatedModel:
+    return SimulatedModel(
+        Scene(SURFACE, Material(1.45, 0.3)),
+        n_rays=3000,
+        realizations=32,
+        seed=4,
+        n_theta=30,
+    )
+
+
+def plane(step: float = 3.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    view = np.deg2rad(np.arange(-70.0, 71.0, step))
+    return np.full(view.size, THETA_I), np.abs(view), np.where(view > 0.0, np.pi, 0.0)
+
+
+def scan(model: SimulatedModel, noise: float, seed: int = 5) -> xr.Dataset:
+    where = plane()
+    brdf = model.brdf(*where)
+    rng = np.random.default_rng(seed)
+    sigma = noise * brdf[:, 0, 0]
+    data = {}
+    for name, (out, into) in {"M00": (0, 0), "M10": (1, 0), "M23": (2, 3)}.items():
+        value = brdf[:, out, into] + sigma * rng.standard_normal(sigma.size)
+        data[name] = ("geometry", value)
+        data[f"{name}_stderr"] = ("geometry", sigma)
+    coords = dict(zip(("theta_i", "theta_s", "dphi"), where, strict=True))
+    return xr.Dataset(data, {name: ("geometry", value) for name, value in coords.items()})
+
+
+def test_bins_are_read_between_their_centres_and_through_the_pole() -> None:
+    n_theta, n_dphi = 90, 180
+    theta = (np.arange(n_theta) + 0.5) * (0.5 * np.pi / n_theta)
+    dphi = np.arange(n_dphi) * (2.0 * np.pi / n_dphi)
+
+    def smooth(theta: np.ndarray, dphi: np.ndarray) -> np.ndarray:
+        x, y = np.sin(theta) * np.cos(dphi), np.sin(theta) * np.sin(dphi)
+        return np.stack([1.0 + x - 0.5 * y + x * y, np.cos(theta) + y**2], axis=-1)
+
+    rng = np.random.default_rng(2)
+    # The first three lie between the pole and the first bin's centre
+    theta_s = np.concatenate([[0.0, 0.004, 0.009], rng.uniform(0.0, 1.5, 40)])
+    azimuth = np.concatenate([[2.1, 0.7, 5.9], rng.uniform(-4.0, 7.0, 40)])
+    table = smooth(theta[:, None], dphi[None, :])
+    read = interpolate_bins(table, theta_s, azimuth)
+    assert_allclose(read, smooth(theta_s, azimuth), atol=5e-4)
+    # At a centre nothing is mixed in
+    assert_allclose(interpolate_bins(table, theta[7:8], dphi[11:12])[0], table[7, 11])
+
+
+@pytest.mark.parametrize(
+    ("ranges", "error"),
+    [(((1.15, 2.6), (0.0, 1.5)), 1e-3), (((0.5, 3.0), (3.5, 12.0)), 1e-3)],
+    ids=["dielectric", "metal"],
+)
+def test_few_indices_tell_of_all_between(ranges, error) -> None:
+    # Two reflections in planes turned against each other, up to 80 degrees of incidence
+    def twice(index: complex) -> np.ndarray:
+        matrices = []
+        for beta in (0.3, 0.8, 1.1, 1.4):
+            one = specular_mueller(np.cos(beta), index.real, index.imag)
+            other = specular_mueller(np.cos(1.2 - 0.5 * beta), index.real, index.imag)
+            c, s = np.cos(2.0 * beta), np.sin(2.0 * beta)
+            turn = np.array([[1, 0, 0, 0], [0, c, s, 0], [0, -s, c, 0], [0, 0, 0, 1]])
+            matrices.append(other @ turn @ one)
+        return np.mean(matrices, axis=0)
+
+    grid = IndexGrid(*ranges)
+    table = np.tensordot(grid.coefficients, [twice(node) for node in grid.nodes], axes=1)
+    rng = np.random.default_rng(1)
+    for n, kappa in zip(
+        rng.uniform(*grid.n, 30), rng.uniform(*grid.kappa, 30), strict=True
+    ):
+        exact = twice(complex(n, kappa))
+        read = np.tensordot(grid.basis(n, kappa), table, axes=1)
+        # Measured by the light of one bounce, of which that of two is a small part
+        once = specular_mueller(np.cos(0.8), n, kappa)[0, 0]
+        assert_allclose(read, exact, atol=error * once)
+
+
+def test_another_index_is_what_a_simulation_of_it_gives(model: SimulatedModel) -> None:
+    index = (1.8, 0.9)
+    other = SimulatedModel(
+        Scene(SURFACE, Material(*index)), n_rays=3000, realizations=32, seed=4, n_theta=30,
+        index_range=((1.8, 1.8), (0.9, 0.9)),
+    )  # fmt: skip
+    direct = other.simulation([THETA_I])
+    there = direct.brdf_total.isel(theta_i=0, theta_s=slice(2, 24), dphi=[0, 7, 18, 29])
+    there = there.transpose("theta_s", "dphi", ...)
+    moved = model.updated({"n": index[0], "kappa": index[1]})
+    read = moved.brdf(
+        THETA_I, there.theta_s.values[:, None], there.dphi.values[None, :]
+    )  # fmt: skip
+    # The same paths: what differs is the mean over a bin from the value at its centre
+    m00 = there.values[..., 0, 0]
+    assert_allclose(read, there.values, atol=0.02 * m00.max())
+    lit = m00 > 0.1 * m00.max()
+    assert np.abs(read[lit, 0, 0] / m00[lit] - 1.0).mean() < 0.01
+    # and light of several bounces is part of it
+    single = direct.brdf.sel(bounces="1").isel(theta_i=0, theta_s=slice(2, 24))
+    assert (single.isel(dphi=18).values[..., 0, 0] < 0.98 * read[:, 2, 0, 0]).any()
+
+
+def test_the_expression_is_the_number(model: SimulatedModel) -> None:
+    import casadi
+
+    theta_i, theta_s, dphi = plane(7.0)
+    geometry = Geometry(theta_i, theta_s, dphi, 0.0 * dphi, np.full(dphi.size, np.nan))
+    new = {"n": 1.7, "kappa": 0.2, "specular_gain": 0.6, "diffuse_albedo": 0.1}
+    values = {k: casadi.DM(v).T for k, v in model.values(geometry).items()}
+    values |= {k: casadi.DM(np.full(geometry.size, v)).T for k, v in new.items()}
+    found = casadi.evalf(model.mueller(values, geometry, range(16))).full()
+    expected = model.updated(new).brdf(theta_i, theta_s, dphi)
+    assert_allclose(found.T.reshape(-1, 4, 4), expected, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("solver", ["casadi", "nlopt"])
+def test_a_fit_recovers_index_and_gains(model: SimulatedModel, solver: str) -> None:
+    truth = {"n": 1.7, "kappa": 0.6, "specular_gain": 0.7, "diffuse_albedo": 0.15}
+    result = fit(scan(model.updated(truth), 0.01), model, free=FREE, solver=solver)
+    assert result.converged
+    for name, true in truth.items():
+        # The scan shares the simulation's paths: only its noise is between them
+        noise = result.stderr_parts[name]["noise"]
+        assert abs(result.values[name] - true) < 4.0 * noise, name
+        assert result.stderr[name] > noise
+    assert result.model.model.material.n == result.values["n"]
+
+
+def test_the_simulations_error_is_that_of_the_parameters(model: SimulatedModel) -> None:
+    truth = {"specular_gain": 0.7, "diffuse_albedo": 0.15}
+    data = scan(model.updated(truth), 0.002)
+    result = fit(data, model)
+    groups = [fit(data, replica) for replica in model.replicas]
+    for name in truth:
+        found = [group.values[name] for group in groups]
+        expected = np.std(found, ddof=1) / np.sqrt(len(found))
+        # Each group alone is weighed a little differently from all together
+        part = result.stderr_parts[name]["simulation"]
+        assert part == pytest.approx(expected, rel=0.25), name
+        noise = result.stderr_parts[name]["noise"]
+        assert result.stderr[name] == pytest.approx(np.hypot(noise, part))
+
+
+def test_the_simulations_error_joins_the_weights(model: SimulatedModel) -> None:
+    data = scan(model.updated({"specular_gain": 0.5}), 0.02)
+    result = fit(data, model, use=["M00"])
+    fitted = result.model
+    where = plane()
+    sigma, error = data.M00_stderr.values, fitted.stderr(*where)[:, 0, 0]
+    assert_allclose(result.readings.stderr.values, np.hypot(sigma, error), rtol=1e-3)
+    assert (error > 0.1 * sigma).any()
+
+
+def test_the_measured_slopes_error_reaches_the_gain(model: SimulatedModel) -> None:
+    data = scan(model.updated({"specular_gain": 0.7, "diffuse_albedo": 0.2}), 0.01)
+    stderr = 0.012
+    held = fit(data, model, priors={"slope_rms": (0.3, stderr)})
+    ends = [
+        fit(data, model, fixed={"slope_rms": 0.3 + sign * stderr}).values["specular_gain"]
+        for sign in (-1.0, 1.0)
+    ]
+    half = 0.5 * abs(ends[1] - ends[0])
+    assert held.stderr_parts["specular_gain"]["slope_rms"] == pytest.approx(half, rel=0.1)
+    assert held.stderr["specular_gain"] > half
+
+
+def test_merged_runs_are_their_mean_and_its_error() -> None:
+    scene = Scene(SURFACE, Material(1.5))
+    runs = [
+        simulate(scene, 0.5, n_rays=400, realizations=8, seed=s, n_theta=6, n_dphi=4)
+        for s in range(9)
+    ]
+    found = merged(runs)
+    values = np.stack([run.brdf_total.values for run in runs])
+    assert_allclose(found.brdf_total.values, values.mean(axis=0), atol=1e-15)
+    spread = values.std(axis=0, ddof=1) / 3.0
+    lit = spread > 0.0
+    assert_allclose(found.brdf_total_stderr.values[lit], spread[lit])
+    # Two routes to one error: within the runs, and between them
+    inside = np.sqrt((np.stack([run.albedo_stderr for run in runs]) ** 2).mean(0) / 9)
+    assert_allclose(found.albedo_stderr.values[0], inside[0], rtol=0.8)
+    assert found.attrs["realizations"] == 72
+
+
+def refuse(message: str, *, scene: Scene | None = None, **options: object) -> None:
+    with pytest.raises((ValueError, TypeError), match=message):
+        SimulatedModel(scene or Scene(SURFACE, Material(1.5)), **options)
+
+
+def test_what_cannot_be_simulated_once_for_all_is_refused(model: SimulatedModel) -> None:
+    based = Scene(SURFACE, Material(1.5, diffuse_albedo=0.3))
+    refuse("got a diffuse base under the interface", scene=based)
+    flat = Scene(HeightMap.flat(size=(10.0, 10.0)), Material(1.5))
+    refuse("scene must have a rough surface", scene=flat)
+    refuse("realizations must be at least 8 .* got 4", realizations=4)
+    refuse("must hold the model's n 1.5", index_range=((1.6, 2.0), (0.0, 1.0)))
+    refuse("must give both n and kappa room", index_range=((1.4, 1.6), (0.0, 0.0)))
+    refuse("scene must be a Scene, got float", scene=1.5)
+    with pytest.raises(ValueError, match=r"bounds of n must lie in \[1\.15, 2\.6\]"):
+        fit(scan(model, 0.01), model, free=("n",), bounds={"n": (1.0, 2.0)})
+    with pytest.raises(ValueError, match="must name parameters, got 'slope_rms_x'"):
+        fit(scan(model, 0.01), model, free=("slope_rms_x",))
+
+
+def test_a_measured_map_brings_its_own_slopes_and_azimuth() -> None:
+    heights = GaussianSurface(
+        shape=(64, 64), spacing=1.0, corr_length=(6.0, 12.0), slope_rms=0.25
+    ).sample(3)
+    model = SimulatedModel(
+        Scene(heights, Material(1.5, 0.1)), n_rays=400, realizations=16,
+        index_range=((1.5, 1.5), (0.1, 0.1)),
+    )  # fmt: skip
+    x, y = (float(np.sqrt(np.mean(slope**2))) for slope in heights.slopes())
+    assert model.model.slope_rms == (x, y)
+    here, there = (
+        model.brdf(0.5, 0.4, np.pi, phi_i=phi)[0, 0] for phi in (0.0, 0.5 * np.pi)
+    )
+    assert not np.isclose(here, there, rtol=0.05)
+
+
+def test_a_bin_without_rays_keeps_the_analytical_curve() -> None:
+    surface = GaussianSurface(shape=(64, 64), spacing=1.0, corr_length=8.0, slope_rms=0.05)
+    material = Material(1.5, 0.1)
+    model = SimulatedModel(
+        Scene(surface, material), n_rays=400, realizations=16,
+        index_range=((1.5, 1.5), (0.1, 0.1)),
+    )  # fmt: skip
+    analytic = MicrofacetModel(material, slope_rms=0.05)
+    # Ten standard deviations of the slope off the peak no ray ever went
+    far = (0.2, 1.0, np.pi)
+    assert_allclose(model.brdf(*far), analytic.brdf(*far), rtol=1e-12)
