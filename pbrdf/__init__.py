@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from pbrdf.errors import AccuracyWarning, DataFileError
     from pbrdf.observation import observe
     from pbrdf.optics.materials import Material
-    from pbrdf.scene import Scene, load_scene
+    from pbrdf.scene import Scene
+    from pbrdf.scene_file import load_scene
     from pbrdf.simulation import simulate
     from pbrdf.surface import (
         Drops,
@@ -55,7 +56,7 @@ _HOME = {
     "MicrofacetModel": "pbrdf.analytic",
     "Scene": "pbrdf.scene",
     "Spheres": "pbrdf.surface",
-    "load_scene": "pbrdf.scene",
+    "load_scene": "pbrdf.scene_file",
     "observe": "pbrdf.observation",
     "simulate": "pbrdf.simulation",
 }

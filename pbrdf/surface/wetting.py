@@ -37,7 +37,7 @@ def young_contact_angle(
     --------
     >>> round(float(np.degrees(young_contact_angle(gamma_sv=40, gamma_sl=22.0,
     ...                                            gamma_lv=72.75))), 2)
-    75.68
+    75.67
     """
     solid = [
         require(name, value, lambda v: (v >= 0) & np.isfinite(v), "be >= 0", "Energies.")
