@@ -1,9 +1,9 @@
-"""`pbrdf fit`: bring the analytical model to goniometer scans."""
+"""`pbrdf fit`: bring the analytical model, or a simulated surface, to scans."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from fitting.result import FitResult
+    from fitting.simulated_model import SimulatedModel
+    from pbrdf import MicrofacetModel
 
 
 def fit(
@@ -22,14 +24,23 @@ def fit(
             help="Goniometer files; several are fitted together.", show_default=False
         ),
     ],
-    n: options.Index,
+    n: Annotated[
+        float | None,
+        typer.Option("--n", min=0.01, max=1e6, help="Real part of the refractive index."),
+    ] = None,
     slope_rms: Annotated[
-        float,
+        float | None,
         typer.Option(
             min=1e-3, max=10.0, help="Slope rms per axis, as `pbrdf statistics` gives."
         ),
-    ],
+    ] = None,
     kappa: options.Kappa = 0.0,
+    scene: Annotated[
+        Path | None,
+        typer.Option(
+            help="Scene (TOML) to simulate with all bounces, in place of index and slope."
+        ),
+    ] = None,
     slope_stderr: Annotated[
         float | None,
         typer.Option(
@@ -47,20 +58,24 @@ def fit(
     loss: Annotated[
         str, typer.Option(help="linear, or soft_l1, huber, cauchy against outliers.")
     ] = "linear",
+    n_rays: options.Rays = 10_000,
+    realizations: options.Realizations = 160,
+    seed: options.Seed = 0,
+    workers: options.Workers = None,
     output: options.Output = None,
     force: options.Force = False,
 ) -> None:
     """Fit gains, albedos, index or slope to scans, with errors and correlations.
 
+    With --scene the surface is traced once, and everything is fitted to all its bounces.
     With --output writes a folder with fit.json, model.toml and scan.png.
 
     Example: pbrdf fit scan.csv --n 1.53 --slope-rms 0.252
     """
-    from pbrdf import Material, MicrofacetModel
+    from pbrdf.cli.progress import progress_bar
     from pbrdf.cli.reading import read_scan
     from pbrdf.cli.staging import staged_folder
 
-    model = MicrofacetModel(Material(n, kappa), slope_rms=slope_rms, shadowing=shadowing)
     measured = {path.stem: read_scan(path, wavelength=wavelength) for path in scans}
     if len(measured) < len(scans):
         msg = "scans must have names of their own, got two files of one name. Rename one."
@@ -69,22 +84,76 @@ def fit(
     from fitting.fit import fit as fit_model
     from fitting.masks import blocked_detector, zeros
 
-    result = fit_model(
-        measured,
-        model,
-        free=options.names(free),
-        solver=solver,
-        priors={"slope_rms": (slope_rms, slope_stderr)} if slope_stderr else None,
-        separate=options.names(separate),
-        mask=(zeros(), blocked_detector(blocked)) if blocked else (zeros(),),
-        loss=loss,
-    )
+    with progress_bar("tracing") as progress:
+        model: MicrofacetModel | SimulatedModel
+        if scene is None:
+            model = _analytic(n, kappa, slope_rms, shadowing)
+        else:
+            if n is not None or slope_rms is not None:
+                msg = "--n and --slope-rms come from the --scene, got both. Leave one out."
+                raise ValueError(msg)
+            model = _simulated(
+                scene,
+                measured.values(),
+                n_rays=n_rays,
+                realizations=realizations,
+                seed=seed,
+                workers=workers,
+                progress=progress,
+            )
+        result = fit_model(
+            measured,
+            model,
+            free=options.names(free),
+            solver=solver,
+            priors=None if slope_stderr is None else _slope(model, slope_stderr),
+            separate=options.names(separate),
+            mask=(zeros(), blocked_detector(blocked)) if blocked else (zeros(),),
+            loss=loss,
+        )
     if output is not None:
         with staged_folder(output, force=force) as stage:
             _write(result, measured, stage)
     typer.echo(result.summary())
     if not result.converged:
         raise typer.Exit(1)
+
+
+def _analytic(
+    n: float | None, kappa: float, slope_rms: float | None, shadowing: str
+) -> "MicrofacetModel":
+    """Return the analytical model to start from."""
+    from pbrdf import Material, MicrofacetModel
+
+    if n is None or slope_rms is None:
+        option = "--n" if n is None else "--slope-rms"
+        msg = f"{option} must be given, got none. Or give a --scene, which has both."
+        raise ValueError(msg)
+    return MicrofacetModel(Material(n, kappa), slope_rms=slope_rms, shadowing=shadowing)
+
+
+def _simulated(
+    scene: Path, scans: "Iterable[xr.Dataset]", **options: Any
+) -> "SimulatedModel":
+    """Return the simulated surface to start from; V is traced where it was measured."""
+    import pbrdf
+    from fitting import SimulatedModel
+
+    names = {str(name) for scan in scans for name in scan.data_vars}
+    circular = any(name[0] == "M" and "3" in name[1:3] for name in names)
+    stokes = "full" if circular else "linear"
+    return SimulatedModel(pbrdf.load_scene(scene), stokes=stokes, **options)
+
+
+def _slope(
+    model: "MicrofacetModel | SimulatedModel", stderr: float
+) -> dict[str, tuple[float, float]]:
+    """Return what is known of the slope."""
+    slope = (model if hasattr(model, "slope_rms") else model.model).slope_rms
+    if isinstance(slope, tuple):
+        msg = "--slope-stderr needs an isotropic surface, got two slopes. Leave it out."
+        raise ValueError(msg)
+    return {"slope_rms": (slope, stderr)}
 
 
 def _write(result: "FitResult", measured: "Mapping[str, xr.Dataset]", folder: Path) -> None:
@@ -98,14 +167,21 @@ def _write(result: "FitResult", measured: "Mapping[str, xr.Dataset]", folder: Pa
     text = json.dumps(result.as_dict(), indent=2)
     (folder / "fit.json").write_text(f"{text}\n", encoding="utf-8")
     notes = {name: estimate.as_dict() for name, estimate in result.estimates.items()}
-    write_model(result.model, folder / "model.toml", notes={"uncertainty": notes})
+    # Of a simulated surface the analytical model that it corrects
+    analytic = {label: getattr(m, "model", m) for label, m in result.models.items()}
+    first = next(iter(analytic.values()))
+    write_model(first, folder / "model.toml", notes={"uncertainty": notes})
     zeniths = np.deg2rad(np.arange(0.5, 90.0))
     for label, scan in measured.items():
         plane = in_plane(scan)
         if not plane.sizes["geometry"]:
             continue
+        model = result.models[label]
         curves = plane_curves(
-            np.unique(plane.theta_i.values), zeniths, analytic=result.models[label]
+            np.unique(plane.theta_i.values),
+            zeniths,
+            analytic=analytic[label],
+            monte_carlo=model if hasattr(model, "simulation") else None,
         )
         name = "scan.png" if len(measured) == 1 else f"{label}.png"
         scan_figure(plane, curves).savefig(folder / name, dpi=140)

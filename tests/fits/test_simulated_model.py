@@ -1,15 +1,20 @@
 """The Monte Carlo in the fit's loop: reading of the bins, any index, errors, recovery."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose
 
+from data_io import read_model, write_goniometer
 from fitting import SimulatedModel, fit
 from fitting.index_grid import IndexGrid
 from fitting.observations import Geometry
 from fitting.simulated_trace import interpolate_bins, merged
 from pbrdf import GaussianSurface, HeightMap, Material, MicrofacetModel, Scene, simulate
+from pbrdf.cli import main
 from pbrdf.optics import specular_mueller
 
 THETA_I = 0.9
@@ -249,3 +254,36 @@ def test_a_bin_without_rays_keeps_the_analytical_curve() -> None:
     # Ten standard deviations of the slope off the peak no ray ever went
     far = (0.2, 1.0, np.pi)
     assert_allclose(model.brdf(*far), analytic.brdf(*far), rtol=1e-12)
+
+
+def test_the_command_fits_a_scene(model: SimulatedModel, tmp_path: Path) -> None:
+    truth = {"n": 1.6, "specular_gain": 0.7, "diffuse_albedo": 0.15}
+    Scene(SURFACE, Material(1.45, 0.3)).to_toml(tmp_path / "scene.toml")
+    write_goniometer(scan(model.updated(truth), 0.01), tmp_path / "scan.csv")
+    arguments = ["fit", str(tmp_path / "scan.csv"), "--free", ",".join(truth)]
+    few = ["--n-rays", "1000", "--realizations", "16", "-o", str(tmp_path / "out")]
+    assert main([*arguments, *few, "--scene", str(tmp_path / "scene.toml")]) == 0
+    found = json.loads((tmp_path / "out" / "fit.json").read_text())
+    for name, true in truth.items():
+        value, stderr = (found["parameters"][name][key] for key in ("value", "stderr"))
+        assert abs(value - true) < 4.0 * stderr
+        assert found["stderr_parts"][name]["simulation"] > 0.0
+    assert read_model(tmp_path / "out" / "model.toml").material.n > 1.45
+
+
+def test_the_command_wants_one_surface(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    analytic = MicrofacetModel(Material(1.5), slope_rms=0.3)
+    brdf = analytic.brdf(*plane())[:, 0, 0]
+    coords = dict(zip(("theta_i", "theta_s", "dphi"), plane(), strict=True))
+    data = xr.Dataset(
+        {"M00": ("geometry", brdf)}, {k: ("geometry", v) for k, v in coords.items()}
+    )
+    write_goniometer(data, tmp_path / "scan.csv")
+    for options, message in (
+        (["--n", "1.5"], "--slope-rms must be given, got none"),
+        (["--n", "1.5", "--scene", "none.toml"], "come from the --scene, got both"),
+    ):
+        assert main(["fit", str(tmp_path / "scan.csv"), *options]) == 2
+        assert message in capsys.readouterr().err
