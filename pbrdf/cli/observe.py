@@ -1,0 +1,201 @@
+"""`pbrdf observe`: the readings of a goniometer, from each detector back to the source."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pbrdf.cli import options
+from pbrdf.cli.options import Stokes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import numpy as np
+    import xarray as xr
+
+
+class Estimator(StrEnum):
+    """How light that reaches the source is valued."""
+
+    facets = "facets"
+    paths = "paths"
+    corners = "corners"
+    counting = "count"
+
+
+class Start(StrEnum):
+    """End of the scan at which rays start."""
+
+    detector = "detector"
+    source = "source"
+
+
+def observe(
+    scene: Annotated[Path, typer.Argument(help="Scene file (TOML).", show_default=False)],
+    scan: Annotated[
+        Path | None,
+        typer.Option(help="Goniometer file whose geometries are to be simulated."),
+    ] = None,
+    theta_i: options.Incidences = "30",
+    theta_view: Annotated[
+        str,
+        typer.Option(
+            "--theta-view-deg",
+            help="View angles in the plane, by commas; positive on the specular side.",
+        ),
+    ] = "-60,-45,-30,-15,0,15,20,25,30,35,40,45,60",
+    phi_i: Annotated[
+        str,
+        typer.Option(
+            "--phi-i-deg", help="Azimuth of the source, or uniform for its average."
+        ),
+    ] = "uniform",
+    source_half_angle: Annotated[
+        float,
+        typer.Option(
+            "--source-half-angle-deg", min=0.006, max=28.0, help="Half-angle of the source."
+        ),
+    ] = 0.5,
+    detector_half_angle: Annotated[
+        float,
+        typer.Option(
+            "--detector-half-angle-deg",
+            min=0.006,
+            max=28.0,
+            help="Half-angle of the detector.",
+        ),
+    ] = 0.5,
+    output: options.Output = None,
+    force: options.Force = False,
+    n_rays: options.Rays = 20_000,
+    realizations: options.Realizations = 32,
+    target: options.Target = None,
+    max_bounces: options.Bounces = 64,
+    hemisphere_samples: Annotated[
+        float,
+        typer.Option(min=0.1, max=1e4, help="Rays above a point of a diffuse base."),
+    ] = 2.0,
+    sample_decay: Annotated[
+        float,
+        typer.Option(min=0.01, max=1.0, help="Factor on them for each bounce before."),
+    ] = 0.5,
+    estimator: Annotated[
+        Estimator, typer.Option(help="How light that reaches the source is valued.")
+    ] = Estimator.facets,
+    start: Annotated[
+        Start,
+        typer.Option(help="Where rays start; from the source long scans are quicker."),
+    ] = Start.detector,
+    wavelength: Annotated[
+        str | None,
+        typer.Option(
+            "--wavelength-um", help="Wavelength, for a material given as a table."
+        ),
+    ] = None,
+    stokes: options.StokesOption = Stokes.full,
+    seed: options.Seed = 0,
+    workers: options.Workers = None,
+) -> None:
+    """Simulate the readings of a goniometer with its finite source and detector.
+
+    The result is a scan (.csv) or, with bounces apart, a dataset (.nc), by the name of
+    the output.
+
+    Example: pbrdf observe scene.toml --scan measured.csv -o simulated.csv
+    """
+    import numpy as np
+
+    import pbrdf
+    from data_io import write_goniometer, write_result
+    from pbrdf.cli.progress import progress_bar
+    from pbrdf.cli.staging import staged_file
+    from pbrdf.readings import as_scan
+
+    loaded = pbrdf.load_scene(scene)
+    target_file = output or scene.with_name(f"{scene.stem}-scan.csv")
+    waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
+    if waves is not None and len(waves) > 1 and target_file.suffix != ".nc":
+        msg = (
+            f"--wavelength-um must be one number for a scan, got {len(waves)}. "
+            "Name an output that ends in .nc."
+        )
+        raise ValueError(msg)
+    if scan is None:
+        geometry = _plane(theta_i, theta_view)
+    else:
+        geometry = _of_scan(scan, None if waves is None else waves[0])
+    azimuth = "uniform" if phi_i == "uniform" else options.numbers(phi_i, "--phi-i-deg")[0]
+    with staged_file(target_file, force=force) as stage:
+        with progress_bar("observing") as progress:
+            result = pbrdf.observe(
+                loaded,
+                *geometry,
+                phi_i=azimuth if isinstance(azimuth, str) else float(np.deg2rad(azimuth)),
+                source_half_angle=float(np.deg2rad(source_half_angle)),
+                detector_half_angle=float(np.deg2rad(detector_half_angle)),
+                n_rays=n_rays,
+                realizations=realizations,
+                target_rel_error=target,
+                max_bounces=max_bounces,
+                hemisphere_samples=hemisphere_samples,
+                sample_decay=sample_decay,
+                estimator=estimator.value,
+                start=start.value,
+                wavelength=waves if waves is None or len(waves) > 1 else waves[0],
+                stokes=stokes.value,
+                seed=seed,
+                workers=workers,
+                progress=progress,
+            )
+        if target_file.suffix == ".nc":
+            write_result(result, stage)
+        else:
+            write_goniometer(as_scan(result), stage)
+    for line in _brightest(result):
+        typer.echo(line)
+    typer.echo(f"Result: {target_file}")
+
+
+def _plane(theta_i: str, theta_view: str) -> "tuple[np.ndarray, np.ndarray, np.ndarray]":
+    """Return every view angle at every incidence. [rad]"""
+    import numpy as np
+
+    incidences = np.deg2rad(options.numbers(theta_i, "--theta-i-deg"))
+    views = np.deg2rad(options.numbers(theta_view, "--theta-view-deg"))
+    source, view = (mesh.ravel() for mesh in np.meshgrid(incidences, views, indexing="ij"))
+    return source, np.abs(view), np.where(view >= 0.0, np.pi, 0.0)
+
+
+def _of_scan(
+    path: Path, wavelength: float | None
+) -> "tuple[np.ndarray, np.ndarray, np.ndarray]":
+    """Return the geometries of a measured scan, each once. [rad]"""
+    import numpy as np
+
+    from pbrdf.cli.reading import read_scan
+
+    scan = read_scan(path, wavelength=wavelength)
+    rows = np.stack([scan[name].values for name in ("theta_i", "theta_s", "dphi")], axis=1)
+    _, first = np.unique(rows.round(9), axis=0, return_index=True)
+    columns = rows[np.sort(first)].T
+    return columns[0], columns[1], columns[2]
+
+
+def _brightest(result: "xr.Dataset") -> "Iterator[str]":
+    """Yield the brightest reading of each incidence (the first wavelength)."""
+    import numpy as np
+
+    if "wavelength" in result.dims:
+        result = result.isel(wavelength=0)
+    for theta_i in np.unique(result.theta_i.values):
+        here = result.isel(geometry=np.flatnonzero(result.theta_i.values == theta_i))
+        m00 = here.brdf_total[:, 0, 0].values
+        place = int(m00.argmax())
+        error = here.brdf_total_stderr[place, 0, 0].item()
+        yield (
+            f"{np.rad2deg(theta_i):.4g}°  largest M00 {m00[place]:.5g} ± {error:.1g} 1/sr "
+            f"at theta_s {np.rad2deg(here.theta_s.values[place]):.4g}°, dphi "
+            f"{np.rad2deg(here.dphi.values[place]):.4g}°"
+        )
