@@ -15,6 +15,7 @@ import typer
 from pbrdf import __version__
 from pbrdf.cli.export import export
 from pbrdf.cli.fit import fit
+from pbrdf.cli.observe import observe
 from pbrdf.cli.pipeline import pipeline
 from pbrdf.cli.plot import plot
 from pbrdf.cli.simulate import simulate
@@ -61,7 +62,7 @@ def dew() -> None:
     raise ValueError(msg)
 
 
-COMMANDS = (pipeline, statistics, fit, simulate, sweep, plot, export)
+COMMANDS = (pipeline, statistics, fit, simulate, observe, sweep, plot, export)
 for function in COMMANDS:
     app.command()(function)
 
