@@ -12,6 +12,7 @@ from pbrdf.kernels.shading import (
     LEAKED,
     N_ESCAPED,
     N_LEAKED,
+    N_MISMATCH,
     N_SEGMENTS,
     N_SELF,
     N_SIDE,
@@ -91,6 +92,7 @@ def to_dataset(
         "rays_leaked": counts[:, N_LEAKED].tolist(),
         "rays_left_sideways": counts[:, N_SIDE].tolist(),
         "self_hits": int(counts[:, N_SELF].sum()),
+        "medium_mismatches": int(counts[:, N_MISMATCH].sum()),
         "rel_error": moments.rel_error(),
     }
     return dataset

@@ -15,12 +15,13 @@ from pbrdf.errors import AccuracyWarning, require
 from pbrdf.kernels.shading import base_strength
 from pbrdf.results import to_dataset
 from pbrdf.scene import Scene
-from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
+from pbrdf.surface import HeightMap
 from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.plan import Moments, Plan, Tally
 from pbrdf.tracer.skips import chosen_skips, explanation
 from pbrdf.tracer.trace import prepare, trace_sample
+from pbrdf.tracer.world import WetField, contaminant_materials, media_of
 from pbrdf.validity import geometric_optics_warnings
 
 STOKES_COUNT = {"full": 4, "linear": 3, "unpolarized": 1}
@@ -28,6 +29,8 @@ STOKES_COUNT = {"full": 4, "linear": 3, "unpolarized": 1}
 BATCHES = 32
 # Below this many realisations the standard errors themselves are too uncertain
 FEW_REALIZATIONS = 8
+# Where paths are cut: on a clean surface, and where transparent bodies may catch light
+MOST_BOUNCES, MOST_EVENTS = 64, 1024
 # Where a run towards a target error gives up
 MAX_SAMPLES = 4096
 
@@ -40,7 +43,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
     n_rays: int = 100_000,
     realizations: int = 1,
     seed: int | None = 0,
-    max_bounces: int = 64,
+    max_bounces: int | None = None,
     target_rel_error: float | None = None,
     wavelength: npt.ArrayLike | None = None,
     n_theta: int = 45,
@@ -69,8 +72,9 @@ def simulate(  # noqa: PLR0913  (the public signature)
         n_rays. With `target_rel_error` it is the least number.
     seed : int or None
         Makes the run reproducible bit for bit, for any number of workers; None draws one.
-    max_bounces : int
-        Paths are cut after so many bounces; what they still carry is `truncated`.
+    max_bounces : int, optional
+        Paths are cut after so many bounces, 64 on a clean surface and 1024 among
+        contaminants, where light may be caught; what they still carry is `truncated`.
     target_rel_error : float, optional
         Add samples until the largest stderr / M00 over the bins above a tenth of the peak
         falls below this; the dataset says what was reached.
@@ -122,7 +126,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
     >>> round(float(result.albedo.sel(bounces="1").item()), 6)
     0.04
     """
-    surface, fixed = scene.surface, isinstance(scene.surface, HeightMap)
+    fixed = not _varies(scene)
     rays = _count("n_rays", n_rays, BATCHES)
     drawn = _count("realizations", realizations, 1)
     batched = fixed or drawn == 1
@@ -130,18 +134,26 @@ def simulate(  # noqa: PLR0913  (the public signature)
     angles = _angles(theta_i)
     waves = _wavelengths(wavelength)
     n, kappa, base = _constants(scene, waves)
+    media = None
+    if scene.contaminants:
+        covering = contaminant_materials(scene.contaminants)
+        media = media_of(scene.materials, covering, waves)
+    bounces = max_bounces
+    if bounces is None:
+        bounces = MOST_BOUNCES if media is None else MOST_EVENTS
     allowed = chosen_skips(skips)
-    if base.shape[1] > 0 and "walk" not in allowed:
+    if (base.shape[1] > 0 or media is not None) and "walk" not in allowed:
+        where = "over a diffuse base" if media is None else "among contaminants"
         msg = (
-            'skips must hold "walk" over a diffuse base, got '
-            f"{sorted(allowed)}. The Embree route traces opaque Fresnel surfaces only."
+            f'skips must hold "walk" {where}, got {sorted(allowed)}. '
+            "The Embree route traces clean opaque Fresnel surfaces only."
         )
         raise ValueError(msg)
     plan = Plan(
         theta_i=angles,
         phi_i=_azimuth(phi_i),
         n_rays=-(-rays * drawn // samples) if batched else rays,
-        max_bounces=_count("max_bounces", max_bounces, 1),
+        max_bounces=_count("max_bounces", bounces, 1),
         n=n,
         kappa=kappa,
         base=base,
@@ -149,6 +161,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
         n_theta=_count("n_theta", n_theta, 1),
         n_dphi=_even("n_dphi", n_dphi),
         skips=allowed,
+        media=media,
     )
     target = None if target_rel_error is None else _target(target_rel_error)
     _check_scene(scene)
@@ -159,13 +172,10 @@ def simulate(  # noqa: PLR0913  (the public signature)
     root = np.random.SeedSequence(seed)
     if batched:
         # The surface, or the one realisation asked for, stays the same in all batches
-        shared = (
-            surface if isinstance(surface, HeightMap) else surface.sample(root.spawn(1)[0])
-        )
-        draw = partial(_trace_fixed, prepare(shared, allowed), plan)
+        first = root.spawn(1)[0] if _varies(scene) else root
+        draw = partial(_trace_fixed, _realize(scene, plan, first), plan)
     else:
-        assert not isinstance(surface, HeightMap)  # a fixed surface is batched
-        draw = partial(_trace_realization, surface, plan)
+        draw = partial(_trace_realization, scene, plan)
 
     moments = Moments(plan)
     limit = samples if target is None else max(samples, MAX_SAMPLES)
@@ -176,6 +186,9 @@ def simulate(  # noqa: PLR0913  (the public signature)
         enough = moments.samples >= max(samples, 2)
         if target is not None and enough and moments.rel_error() <= target:
             break
+    for note in moments.notes:
+        warnings.warn(note, AccuracyWarning, stacklevel=2)
+    notes += moments.notes
     return to_dataset(
         moments,
         scene,
@@ -192,22 +205,41 @@ def simulate(  # noqa: PLR0913  (the public signature)
             "target_rel_error": np.nan if target is None else target,
             "intersector": "height-field walk" if "walk" in allowed else "embree",
             "explanation": _explain(scene, plan) if explain else [],
+            "contaminants": [str(dict(report)) for report in moments.reports],
             "warnings": notes,
         },
     )
 
 
+def _varies(scene: Scene) -> bool:
+    """Whether realisations of the scene differ."""
+    drawn = any(getattr(one, "random", False) for one in scene.contaminants)
+    return drawn or not isinstance(scene.surface, HeightMap)
+
+
+def _realize(
+    scene: Scene, plan: Plan, seed: np.random.SeedSequence
+) -> Field | EmbreeField | WetField:
+    """One realisation of the scene, ready for tracing."""
+    surface = scene.surface
+    if not isinstance(surface, HeightMap):
+        surface = surface.sample(seed)
+    target = prepare(surface, plan.skips)
+    if plan.media is None:
+        return target
+    assert isinstance(target, Field)  # contaminants exclude the Embree route
+    return WetField.of(target, surface, scene.contaminants, plan.media, seed)
+
+
 def _trace_fixed(
-    target: Field | EmbreeField, plan: Plan, seed: np.random.SeedSequence
+    target: Field | EmbreeField | WetField, plan: Plan, seed: np.random.SeedSequence
 ) -> Tally:
     return trace_sample(target, plan, seed)
 
 
-def _trace_realization(
-    surface: GaussianSurface | MeasuredSurface, plan: Plan, seed: np.random.SeedSequence
-) -> Tally:
+def _trace_realization(scene: Scene, plan: Plan, seed: np.random.SeedSequence) -> Tally:
     heights, rays = seed.spawn(2)
-    return trace_sample(prepare(surface.sample(heights), plan.skips), plan, rays)
+    return trace_sample(_realize(scene, plan, heights), plan, rays)
 
 
 def _explain(scene: Scene, plan: Plan) -> list[str]:
@@ -357,12 +389,6 @@ def _constants(
 
 
 def _check_scene(scene: Scene) -> None:
-    if scene.contaminants:
-        msg = (
-            f"contaminants must be empty in this version, got {len(scene.contaminants)}. "
-            "Only clean opaque surfaces are simulated."
-        )
-        raise ValueError(msg)
     if isinstance(scene.surface, HeightMap) and scene.surface.missing > 0.0:
         msg = (
             "heights must be complete to be traced, got "
@@ -376,19 +402,17 @@ def _warnings(
     scene: Scene, angles: np.ndarray, waves: np.ndarray | None, drawn: int
 ) -> list[str]:
     notes: list[str] = []
-    surface = scene.surface
-    if not isinstance(surface, HeightMap):
-        if drawn == 1:
-            notes.append(
-                "One realisation of a random surface: standard errors hold for this "
-                "surface only. Ask for 16 realizations or more."
-            )
-        elif drawn < FEW_REALIZATIONS:
-            notes.append(
-                f"{drawn} realizations are too few for honest standard errors; "
-                "ask for 16 or more."
-            )
-        if waves is not None:
-            for wave in np.atleast_1d(waves):
-                notes += geometric_optics_warnings(surface, angles, float(wave))
+    if _varies(scene) and drawn == 1:
+        notes.append(
+            "One realisation of a random scene: standard errors hold for this "
+            "one only. Ask for 16 realizations or more."
+        )
+    elif _varies(scene) and drawn < FEW_REALIZATIONS:
+        notes.append(
+            f"{drawn} realizations are too few for honest standard errors; "
+            "ask for 16 or more."
+        )
+    if waves is not None and not isinstance(scene.surface, HeightMap):
+        for wave in np.atleast_1d(waves):
+            notes += geometric_optics_warnings(scene.surface, angles, float(wave))
     return notes

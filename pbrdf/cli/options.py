@@ -133,7 +133,7 @@ Target = Annotated[
     float | None,
     typer.Option("--target-rel-error", min=1e-6, max=0.999, help="Go on to this error."),
 ]
-Bounces = Annotated[int, typer.Option("--max-bounces", min=1, max=10_000)]
+Bounces = Annotated[int | None, typer.Option("--max-bounces", min=1, max=10_000)]
 ThetaBins = Annotated[int, typer.Option("--n-theta", min=1, max=2000, help="Zenith bins.")]
 DphiBins = Annotated[int, typer.Option("--n-dphi", min=2, max=4000, help="Azimuth bins.")]
 StokesOption = Annotated[

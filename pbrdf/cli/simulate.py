@@ -27,7 +27,7 @@ def simulate(
     n_rays: options.Rays = 100_000,
     realizations: options.Realizations = 16,
     target: options.Target = None,
-    max_bounces: options.Bounces = 64,
+    max_bounces: options.Bounces = None,
     wavelength: Annotated[
         str | None,
         typer.Option(

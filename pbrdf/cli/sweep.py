@@ -38,7 +38,7 @@ def sweep(
     n_rays: options.Rays = 100_000,
     realizations: options.Realizations = 16,
     target: options.Target = None,
-    max_bounces: options.Bounces = 64,
+    max_bounces: options.Bounces = None,
     n_theta: options.ThetaBins = 45,
     n_dphi: options.DphiBins = 90,
     stokes: options.StokesOption = Stokes.full,

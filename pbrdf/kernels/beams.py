@@ -27,14 +27,14 @@ FILM = -5.0  # the number of the film among the bodies a beam is inside of
 Room = namedtuple("Room", "state hit")
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def copy_beam(state, source, target):
     """Copy one row of the stack over another."""
     for column in range(N_STATE):
         state[target, column] = state[source, column]
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def inside_slot(state, top, number, axis_x, axis_y):
     """Slot that holds a body, by its number and the nearest axis; -1 if none does."""
     found = -1
@@ -51,7 +51,7 @@ def inside_slot(state, top, number, axis_x, axis_y):
     return found
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def enter_body(state, top, number, axis_x, axis_y):
     """Add a body to those the beam is inside of; False if there is no room."""
     slot = int(state[top, N_INSIDE])
@@ -65,7 +65,7 @@ def enter_body(state, top, number, axis_x, axis_y):
     return True
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def leave_body(state, top, slot):
     """Remove one of the bodies the beam is inside of; the last takes its place."""
     last = int(state[top, N_INSIDE]) - 1
@@ -74,7 +74,7 @@ def leave_body(state, top, slot):
     state[top, N_INSIDE] = last
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def move_axes(state, top, shift_x, shift_y):
     """Follow a wrap round the period: all axes that the beam knows move along."""
     state[top, LEFT + 1] += shift_x

@@ -39,7 +39,7 @@ Bodies = namedtuple(
 )
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def slab_interval(a, b, c, d_x, d_y, d_z, k_x, k_y, k_z, t_low, t_high):
     """Part of (t_low, t_high) in which a ray is inside a quadric, or MISSED."""
     # Outside minus inside is square t² + 2 half t + ...; at its least value nothing cancels
@@ -118,7 +118,7 @@ def body_normal(bodies, k, d_x, d_y, d_z):
     return d_x * scale, d_y * scale, n_z * scale
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def span_of_heights(bodies, z, k_z, t_limit):
     """Distances between which a ray is at the heights of the bodies."""
     if k_z > 0.0:
@@ -129,7 +129,7 @@ def span_of_heights(bodies, z, k_z, t_limit):
     return 0.0, (t_limit if between else -1.0)
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def names_image(state, top, column, k, axis_x, axis_y, radius):
     """Whether (number, axis) in three columns of a beam name this image of body k."""
     return (
@@ -139,7 +139,7 @@ def names_image(state, top, column, k, axis_x, axis_y, radius):
     )
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def is_known(state, top, k, axis_x, axis_y, radius):
     """Whether the beam is inside this image of body k, or has just left it."""
     if names_image(state, top, LEFT, k, axis_x, axis_y, radius):

@@ -16,7 +16,7 @@ GRAZING = 1e-15
 TWO_PI = 2.0 * math.pi
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def set_direction(state, top, k_x, k_y, k_z):
     """Give the beam a direction, as a unit vector."""
     scale = 1.0 / math.sqrt(k_x * k_x + k_y * k_y + k_z * k_z)
@@ -25,7 +25,7 @@ def set_direction(state, top, k_x, k_y, k_z):
     state[top, KZ] = k_z * scale
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def turn_columns(state, top, columns, c2, s2):
     """Turn the frame of the outgoing Stokes vector, paper eq. (11)."""
     for column in range(columns):
@@ -35,7 +35,7 @@ def turn_columns(state, top, columns, c2, s2):
         state[top, MUELLER + 8 + column] = c2 * u - s2 * q
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def scale_columns(state, top, columns, factor):
     """Weaken or strengthen the beam."""
     for row in range(4):
@@ -43,7 +43,7 @@ def scale_columns(state, top, columns, factor):
             state[top, MUELLER + 4 * row + column] *= factor
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def apply_elements(state, top, columns, a, b, c, d):
     """Multiply by [[a, b], [b, a]] and [[c, -d], [d, c]], paper eq. (10)."""
     for column in range(columns):
@@ -57,7 +57,7 @@ def apply_elements(state, top, columns, a, b, c, d):
         state[top, MUELLER + 12 + column] = d * u + c * v
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def meet(state, top, columns, n_x, n_y, n_z):
     """Turn the frame into the plane of incidence; returns the cosine of incidence.
 
@@ -80,7 +80,7 @@ def meet(state, top, columns, n_x, n_y, n_z):
     return min(max(-(k_x * n_x + k_y * n_y + k_z * n_z), GRAZING), 1.0)
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def reflect_beam(state, top, n_x, n_y, n_z, cos_in):
     """Turn the beam to its mirror direction."""
     set_direction(
@@ -91,7 +91,7 @@ def reflect_beam(state, top, n_x, n_y, n_z, cos_in):
     )  # fmt: skip
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def refract_beam(state, top, n_x, n_y, n_z, cos_in, ratio):
     """Turn the beam to its direction behind an interface of relative index `ratio`."""
     # Snell: what lies along the interface shrinks by the ratio
@@ -105,7 +105,7 @@ def refract_beam(state, top, n_x, n_y, n_z, cos_in, ratio):
     )  # fmt: skip
 
 
-@jit
+@jit(forceinline=True)
 def scatter_about(state, top, n_x, n_y, n_z, draw_a, draw_b):
     """Send the beam out as the cosine about a normal; returns the cosine of exit.
 

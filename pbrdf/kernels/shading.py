@@ -29,7 +29,9 @@ SPECULAR = -1.0  # in COS_OUT: mirror reflection
 # What became of the rays of a sample, the path segments they took, and the hits of a facet
 # just left (impossible but for rounding inside the intersector)
 N_ESCAPED, N_TRUNCATED, N_LEAKED, N_SIDE, N_SEGMENTS, N_SELF = 0, 1, 2, 3, 4, 5
-N_ORDERS, N_COUNTS = 6, 9  # then the escaped paths by class of bounces
+N_ORDERS = 6  # then the escaped paths by class of bounces
+# Beams that were inside of a body without having entered it
+N_MISMATCH, N_COUNTS = 9, 10
 # Energies of unpolarised light
 ABSORBED, TRUNCATED, LEAKED, SIDEWAYS, N_ENERGIES = 0, 1, 2, 3, 4
 

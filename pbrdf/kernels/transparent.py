@@ -119,7 +119,7 @@ Media = namedtuple("Media", "n absorption solid solid_n solid_kappa base black")
 World = namedtuple("World", "terrain film bodies media")
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def medium_of(world, state, top):
     """Medium the beam is in: of all that holds it, the one named first in the scene."""
     medium = 0
@@ -174,7 +174,7 @@ def next_facet(terrain, state, top, start, lift, flip, t_limit, hit):
     return fate
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def next_surface(world, state, top, hit):
     """Surface of a body, or plane of a level film, that the beam meets next."""
     film, bodies = world.film, world.bodies
@@ -203,14 +203,14 @@ def next_surface(world, state, top, hit):
             hit[HIT_BODY] = k
             hit[HIT_X] = axis_x
             hit[HIT_Y] = axis_y
-    if film.kind == LEVEL and state[top, START] != ON_FILM:
-        if k_z > 0.0 if in_film else k_z < 0.0:
-            t_plane = max((film.height - z) / k_z, 0.0)
-            if t_plane < t:
-                t = t_plane
-                kind = FILM_UP if in_film else FILM_DOWN
-                hit[HIT_FACET] = -1.0
-                hit[HIT_Z] = film.height
+    nears = k_z > 0.0 if in_film else k_z < 0.0
+    if film.kind == LEVEL and nears and state[top, START] != ON_FILM:
+        t_plane = max((film.height - z) / k_z, 0.0)
+        if t_plane < t:
+            t = t_plane
+            kind = FILM_UP if in_film else FILM_DOWN
+            hit[HIT_FACET] = -1.0
+            hit[HIT_Z] = film.height
     hit[HIT_T] = t
     # Other bodies: from inside of one only where bodies overlap
     if bodies.medium.size > 0 and (bodies_inside == 0 or bodies.overlap):
@@ -223,9 +223,9 @@ def next_surface(world, state, top, hit):
     return kind, in_film
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def next_event(world, state, top, hit):
-    """What the beam meets next; where and how far away is written into `hit`."""
+    """Find what the beam meets next; where and how far away is written into `hit`."""
     terrain, film = world.terrain, world.film
     kind, in_film = next_surface(world, state, top, hit)
     if kind == ASTRAY:
@@ -259,7 +259,7 @@ def next_event(world, state, top, hit):
     return kind
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def move_beam(world, state, top, kind, hit):
     """Take the beam to where the event is, round the period if need be."""
     terrain = world.terrain
@@ -270,9 +270,7 @@ def move_beam(world, state, top, kind, hit):
     size_x = nx * terrain.pitch_x
     size_y = ny * terrain.pitch_y
     new_x, new_y = x, y
-    facet = kind == GROUND or (
-        (kind == FILM_DOWN or kind == FILM_UP) and hit[HIT_FACET] >= 0.0
-    )
+    facet = kind == GROUND or (kind in (FILM_DOWN, FILM_UP) and hit[HIT_FACET] >= 0.0)
     if facet:
         new_x = (hit[HIT_I] + hit[HIT_U]) * terrain.pitch_x
         new_y = (hit[HIT_J] + hit[HIT_V]) * terrain.pitch_y
@@ -299,7 +297,7 @@ def move_beam(world, state, top, kind, hit):
         state[top, FACET] = hit[HIT_FACET]
         state[top, CELL_U] = hit[HIT_U]
         state[top, CELL_V] = hit[HIT_V]
-    elif kind == BODY_IN or kind == BODY_OUT:
+    elif kind in (BODY_IN, BODY_OUT):
         state[top, START] = ON_BODY
         state[top, LEFT] = hit[HIT_BODY]
         state[top, LEFT + 1] = hit[HIT_X]
@@ -310,10 +308,10 @@ def move_beam(world, state, top, kind, hit):
         state[top, FACET] = -1.0
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def normal_at(world, state, top, kind, hit):
-    """Normal of the surface just met, towards the beam."""
-    if kind == BODY_IN or kind == BODY_OUT:
+    """Find the normal of the surface just met, towards the beam."""
+    if kind in (BODY_IN, BODY_OUT):
         k = int(hit[HIT_BODY])
         n_x, n_y, n_z = body_normal(
             world.bodies, k, state[top, X] - hit[HIT_X], state[top, Y] - hit[HIT_Y],
@@ -342,13 +340,13 @@ def set_rate(state, top, n_x, n_y, n_z):
     state[top, RATE] = max(abs(along) / abs(n_z), GRAZING)
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def cross(world, state, top, kind, hit):
     """Note that the beam has crossed the surface just met; False if it cannot be noted."""
     number = FILM
-    if kind == BODY_IN or kind == BODY_OUT:
+    if kind in (BODY_IN, BODY_OUT):
         number = hit[HIT_BODY]
-    if kind == BODY_IN or kind == FILM_DOWN:
+    if kind in (BODY_IN, FILM_DOWN):
         return enter_body(state, top, number, hit[HIT_X], hit[HIT_Y])
     slot = inside_slot(state, top, number, hit[HIT_X], hit[HIT_Y])
     if slot >= 0:
@@ -356,7 +354,7 @@ def cross(world, state, top, kind, hit):
     return slot >= 0
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def meet_interface(world, w, state, top, kind, hit, columns, draw):
     """Reflect and refract at the surface of a transparent body; returns the new top.
 
@@ -406,9 +404,9 @@ def meet_interface(world, w, state, top, kind, hit, columns, draw):
     return top + 1 if both else top
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def meet_solid(world, w, state, top, kind, hit, columns, draw_a, draw_b, energy):
-    """Reflect at something opaque, and scatter at the base under it; returns the new top."""
+    """Reflect at something opaque and scatter at the base under it; returns the new top."""
     media = world.media
     if kind == GROUND:
         labels = world.terrain.labels
@@ -480,7 +478,7 @@ def deposit(state, top, columns, w, cos_phi_i, sin_phi_i, tally):
             ]
 
 
-@jit(inline="always")
+@jit(forceinline=True)
 def end_beam(state, top, kind, columns, w, cos_phi_i, sin_phi_i, tally):
     """Book what has become of a beam that goes no further."""
     if kind == OUT and state[top, EVENTS] > 0.0 and state[top, KZ] > 0.0:

@@ -1,7 +1,9 @@
 """What is traced over one surface sample, and the tally that comes back."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +11,7 @@ from pbrdf.conventions import BOUNCES, detector_bins
 from pbrdf.kernels import shading
 from pbrdf.kernels.moments import add_sample
 from pbrdf.kernels.spectra import N_SUMS
+from pbrdf.kernels.transparent import Media
 from pbrdf.tracer.spectra import WORTHWHILE, Spectrum
 
 
@@ -34,6 +37,8 @@ class Plan:
         Detector bins.
     skips : frozenset of str
         Names of the skips of `pbrdf.tracer.skips` that are allowed.
+    media : Media or None
+        Constants of what lies on the surface; None on a clean one.
     """
 
     theta_i: np.ndarray
@@ -47,6 +52,12 @@ class Plan:
     n_theta: int
     n_dphi: int
     skips: frozenset[str] = frozenset()
+    media: Media | None = None
+
+    @property
+    def splits(self) -> bool:
+        """Whether a ray may come apart, so that only a part of it is lost sideways."""
+        return self.base.shape[1] > 0 or self.media is not None
 
     @cached_property
     def spectrum(self) -> Spectrum | None:
@@ -71,13 +82,15 @@ class Tally:
     """Flux, energy and counts of one sample, per incident direction.
 
     `flux` has the shape of the plan and is not normalised; `energy` (angles, wavelengths,
-    4) is what was absorbed, truncated, leaked and lost sideways; `counts` (angles, 9) as in
-    `pbrdf.kernels.shading`.
+    4) is what was absorbed, truncated, leaked and lost sideways; `counts` (angles,
+    N_COUNTS) as in `pbrdf.kernels.shading`; `reports` and `notes` tell of contaminants.
     """
 
     flux: np.ndarray
     energy: np.ndarray
     counts: np.ndarray
+    reports: tuple[Mapping[str, Any], ...] = ()
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def empty(cls, plan: Plan) -> "Tally":
@@ -97,6 +110,8 @@ class Moments:
         shape = plan.tally_shape
         self.plan = plan
         self.samples = 0
+        self.reports: tuple[Mapping[str, Any], ...] = ()
+        self.notes: dict[str, None] = {}
         self.counts = np.zeros((shape[0], shading.N_COUNTS), dtype=np.int64)
         self._mean = np.zeros(shape)
         self._scatter = np.zeros(shape)
@@ -109,10 +124,12 @@ class Moments:
         """Add one sample."""
         self.samples += 1
         self.counts += tally.counts
+        self.reports = self.reports or tally.reports
+        self.notes |= dict.fromkeys(tally.notes)
         angles, wavelengths, orders = tally.flux.shape[:3]
         # Rays that left a finite map sideways count in neither part of the fraction; where
-        # a base splits rays, only a part of each may leave so and has its own account
-        aside = tally.counts[:, shading.N_SIDE] if self.plan.base.shape[1] == 0 else 0
+        # rays split, only a part of each may leave so and has its own account
+        aside = 0 if self.plan.splits else tally.counts[:, shading.N_SIDE]
         counted = np.broadcast_to(self.plan.n_rays - aside, (angles,))
         if not counted.all():
             worst = int(np.flatnonzero(counted == 0)[0])
@@ -149,7 +166,7 @@ class Moments:
 
     def _one_path(self) -> np.ndarray:
         """Mean flux of one escaped path (angles, wavelengths, bounces) in the mean flux."""
-        counts = self.counts[:, None, shading.N_ORDERS :]
+        counts = self.counts[:, None, shading.N_ORDERS : shading.N_MISMATCH]
         albedo = np.mean(self._albedo, axis=0)
         return np.where(counts > 0, albedo / np.maximum(counts, 1), 0.0)
 

@@ -1,19 +1,22 @@
-"""Trace one surface sample, by the exact walk or by Embree."""
+"""Trace one surface sample: clean, by the exact walk or by Embree, or contaminated."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from pbrdf.kernels import shading
+from pbrdf.kernels.beams import N_STATE, Room
 from pbrdf.kernels.binning import bin_edges
 from pbrdf.kernels.entry import Source
 from pbrdf.kernels.spectra import shade_gathered
+from pbrdf.kernels.transparent import N_HIT, trace_among_bodies
 from pbrdf.kernels.transport import N_WAITING, sweep_batch, trace_batch
 from pbrdf.surface.heightmap import HeightMap
 from pbrdf.tracer.embree import EmbreeField, trace_waves
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.plan import Plan, Tally
 from pbrdf.tracer.spectra import NOTHING
+from pbrdf.tracer.world import WetField
 
 
 def prepare(surface: HeightMap, skips: frozenset[str]) -> Field | EmbreeField:
@@ -25,7 +28,7 @@ def prepare(surface: HeightMap, skips: frozenset[str]) -> Field | EmbreeField:
 
 
 def trace_sample(
-    target: Field | EmbreeField, plan: Plan, seed: np.random.SeedSequence
+    target: Field | EmbreeField | WetField, plan: Plan, seed: np.random.SeedSequence
 ) -> Tally:
     """Trace every incident direction of the plan over one surface.
 
@@ -33,6 +36,8 @@ def trace_sample(
     the stream, so that neither the number of threads nor the intersector changes the rays.
     """
     tally = Tally.empty(plan)
+    if isinstance(target, WetField):
+        tally = replace(tally, reports=target.reports, notes=target.notes)
     zenith, azimuth = bin_edges(plan.n_theta, plan.n_dphi)
     optics = shading.Optics(plan.n, plan.kappa, plan.base, plan.n_stokes)
     record = np.empty((plan.max_bounces + 1, 1, shading.N_RECORD))
@@ -41,7 +46,7 @@ def trace_sample(
     shifts = rng.random((len(plan.theta_i), 3))
     streams = rng.integers(2**63, size=len(plan.theta_i), dtype=np.uint64)
     for index, theta in enumerate(plan.theta_i):
-        field = target.field if isinstance(target, EmbreeField) else target
+        field = target if isinstance(target, Field) else target.field
         launch = field.entry_rectangle(theta, plan.phi_i)
         source = Source(
             np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
@@ -54,6 +59,13 @@ def trace_sample(
         )  # fmt: skip
         if isinstance(target, EmbreeField):
             trace_waves(target, source, plan.max_bounces, optics, bins)
+            continue
+        if isinstance(target, WetField):
+            room = Room(np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT))
+            trace_among_bodies(
+                target.world, source, field.terrain.z_top, plan.max_bounces,
+                plan.n_stokes, room, bins,
+            )  # fmt: skip
             continue
         shared = plan.spectrum
         light = shared.room(index, plan.max_bounces) if shared else NOTHING

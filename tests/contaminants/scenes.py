@@ -1,0 +1,46 @@
+"""Runs of contaminated scenes whose answers are known, and verdicts on them."""
+
+import numpy as np
+
+from pbrdf import HeightMap, Scene, simulate
+
+BATCHES = 32
+# Two-sided 1e-5 of Student's t with 31 degrees of freedom
+LIMIT = 5.26
+
+
+def whole(result):
+    """Mueller matrix of all light that comes back."""
+    flux = result.brdf_total * result.projected_solid_angle
+    return flux.isel(theta_i=0).sum(("theta_s", "dphi")).values
+
+
+def flat_runs(substrate, contaminants, theta, *, seeds=24, size=(1.0, 1.0), **options):
+    """Mean of the whole Mueller matrix over seeds, its standard error, and one result."""
+    scene = Scene(HeightMap.flat(size=size), substrate, contaminants)
+    results = [simulate(scene, theta, seed=k, **options) for k in range(seeds)]
+    matrices = np.array([whole(r) for r in results])
+    stderr = matrices.std(axis=0, ddof=1) / np.sqrt(seeds)
+    return matrices.mean(axis=0), stderr, results[0]
+
+
+def assert_within(value, stderr, expected, limit=LIMIT, floor=1e-12, extra=0.0):
+    """Each value within `limit` of its standard errors; `floor` is for rounding."""
+    error = np.abs(np.asarray(value) - expected)
+    allowed = limit * np.hypot(stderr, extra) + floor
+    assert np.all(error <= allowed), f"{value} +- {stderr}, expected {expected}"
+
+
+def assert_closed(result):
+    """Energy in and out, whatever became of it."""
+    for name in ("absorbed", "truncated", "leaked", "transmitted"):
+        assert (result[name].values >= 0.0).all()
+    lost = result.absorbed + result.truncated + result.leaked + result.left_sideways
+    return float(np.abs(result.albedo.sum("bounces") + lost - 1.0).max())
+
+
+def clean_counters(result):
+    """No beam went astray."""
+    assert result.attrs["medium_mismatches"] == 0
+    assert max(result.attrs["rays_leaked"]) == 0
+    assert result.attrs["self_hits"] == 0
