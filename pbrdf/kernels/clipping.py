@@ -50,21 +50,21 @@ def radius_squared(slabs, s):
 
 
 @jit(allocates=False)
-def moment_below(slabs, s):
-    """Integral of r²/2 over the heights of the body below s: its volume over 2 π."""
+def moment_between(slabs, s_low, s_high):
+    """Integral of r²/2 over the heights of the body in between: its volume over 2 π."""
     total = 0.0
     for index in range(slabs.shape[0]):
-        low = slabs[index, LOW]
-        high = min(slabs[index, HIGH], s)
+        low = max(slabs[index, LOW], s_low)
+        high = min(slabs[index, HIGH], s_high)
         if high <= low:
-            break
+            continue
         # About the lower end, so that small parts keep their digits
-        a = slabs[index, CONSTANT] + low * (
+        slope = slabs[index, LINEAR] + 2.0 * low * slabs[index, SQUARE]
+        squared = slabs[index, CONSTANT] + low * (
             slabs[index, LINEAR] + low * slabs[index, SQUARE]
         )
-        b = slabs[index, LINEAR] + 2.0 * low * slabs[index, SQUARE]
         h = high - low
-        total += 0.5 * h * (a + h * (b / 2.0 + h * slabs[index, SQUARE] / 3.0))
+        total += 0.5 * h * (squared + h * (slope / 2.0 + h * slabs[index, SQUARE] / 3.0))
     return total
 
 
@@ -170,8 +170,10 @@ def azimuth_share(
     r_a = 0.0
     s_a = surface_height(heights, periodic, pitch_x, pitch_y, x, y) - z
     inside = radius_squared(slabs, s_a) > 0.0
+    # Where the surface leaves the body the profile above it begins, and it ends where the
+    # surface enters; a body that floats over the axis has all of it
     top = slabs[slabs.shape[0] - 1, HIGH]
-    volume = moment_below(slabs, top) if s_a < top else 0.0
+    volume = moment_between(slabs, -FAR, top) if s_a < top and not inside else 0.0
     wetted = 0.0
     outermost = 0.0
     while r_a < reach:
@@ -199,11 +201,11 @@ def azimuth_share(
             s = s_a + (s_b - s_a) * share
             if inside:
                 moment, area = part_inside(r_a, s_a, r, s)
-                volume -= moment_below(slabs, s)
+                volume += moment_between(slabs, s, top)
                 outermost = r
             else:
                 moment, area = part_inside(r, s, r_b, s_b)
-                volume += moment_below(slabs, s)
+                volume -= moment_between(slabs, s, top)
                 outermost = r_b
             volume += moment
             wetted += area
@@ -219,7 +221,10 @@ def azimuth_share(
                 r_out = r_m + (r_b - r_m) * share
                 s_out = s_m + (s_b - s_m) * share
                 moment, area = part_inside(r_in, s_in, r_out, s_out)
-                volume += moment + moment_below(slabs, s_in) - moment_below(slabs, s_out)
+                volume += moment
+                # Signed: on its way the surface may fall or rise
+                volume += moment_between(slabs, s_out, s_in)
+                volume -= moment_between(slabs, s_in, s_out)
                 wetted += area
                 outermost = r_out
         r_a, s_a, inside = r_b, s_b, still
@@ -252,14 +257,17 @@ def volume_above(heights, periodic, pitch_x, pitch_y, z_min, slabs, x, y, z, azi
 
 @jit(allocates=False)
 def settled_height(
-    heights, periodic, pitch_x, pitch_y, z_min, slabs, x, y, sunk, low, high, azimuths
-):
-    """Find the reference height in [low, high] at which `sunk` lies below the surface.
+    heights, periodic, pitch_x, pitch_y, z_min, slabs, x, y, above, sunk, low, high,
+    start, azimuths,
+):  # fmt: skip
+    """Find the reference height in [low, high] that parts the body as on a plane.
 
+    `above` and `sunk` are its volumes above and below the plane; the smaller one decides.
+    The search begins at `start`.
     Returns the height, the volume above, the wetted area and its outermost distance.
     """
-    whole = 2.0 * math.pi * moment_below(slabs, slabs[slabs.shape[0] - 1, HIGH])
-    z = 0.5 * (low + high)
+    whole = above + sunk
+    z = start
     volume = 0.0
     wetted = 0.0
     rim = 0.0
@@ -267,8 +275,11 @@ def settled_height(
         volume, wetted, rim = volume_above(
             heights, periodic, pitch_x, pitch_y, z_min, slabs, x, y, z, azimuths
         )
-        excess = (whole - volume) - sunk
-        if abs(excess) <= 1e-14 * whole or high - low <= 1e-15 * (abs(low) + abs(high)):
+        excess = above - volume if above < sunk else (whole - volume) - sunk
+        enough = abs(excess) <= 1e-13 * above
+        if (enough and above < sunk) or high - low <= 1e-15 * (abs(low) + abs(high)):
+            break
+        if enough and abs(excess) <= 1e-15 * whole:
             break
         if excess > 0.0:
             low = z

@@ -174,9 +174,7 @@ def _assemble(
         np.concatenate([np.empty(0), *(getattr(here, name) for _, here in settled)])
         for name in "xyz"
     )
-    if ground.surface.periodic:
-        length_x, length_y = ground.surface.size
-        x, y = x % length_x, y % length_y
+    x, y = ground.wrapped(np.column_stack([x, y])).T.copy()
     # What lies below the surface everywhere is of no concern
     floor = ground.lowest - z
     cut = [

@@ -7,10 +7,11 @@ merging, and the share of the surface they cover stays the same.
 import numpy as np
 from scipy.spatial import cKDTree
 
+from pbrdf.surface.periodic import nearest, wrapped
 from pbrdf.surface.shapes import cap_radius, cap_volume
 
-# Growth of R² between two looks for contacts: 1 % of the radius of a drop never merged
-STEP = 0.02
+# Growth of R² between two looks for contacts: 2 % of the radius of a drop never merged
+STEP = 0.04
 # Least share of the final R² at which to look first
 EARLIEST = 1e-9
 
@@ -100,9 +101,8 @@ def merge(
             continue
         merged[[one, other]] = True
         total = volumes[one] + volumes[other]
-        off = places[other] - places[one]
-        off -= lengths * np.round(off / lengths)
-        places[one] = (places[one] + off * (volumes[other] / total)) % lengths
+        off = nearest(places[other] - places[one], lengths)
+        places[one] = wrapped(places[one] + off * (volumes[other] / total), lengths)
         volumes[one] = total
         kept[other] = False
     return places[kept], volumes[kept]
@@ -115,7 +115,7 @@ def touching(
     lengths = np.asarray(period)
     found, depths = [], []
     seen = radii * (np.sin(contact_angle) if contact_angle < np.pi / 2 else 1.0)
-    points = places % lengths
+    points = wrapped(places, lengths)
     # Size by size, halving: pairs of large drops reach further than those of small ones
     high = float(seen.max())
     while True:
@@ -161,10 +161,10 @@ def _first_contact(
     if len(places) < 2:
         return np.inf
     lengths = np.asarray(period)
-    tree = cKDTree(places % lengths, boxsize=lengths)
-    nearest = float(tree.query(places % lengths, k=2)[0][:, 1].min())
+    points = wrapped(places, lengths)
+    distances, _ = cKDTree(points, boxsize=lengths).query(points, k=2)
     sine = np.sin(contact_angle) if contact_angle < np.pi / 2 else 1.0
-    return float(0.5 * nearest / sine) ** 2
+    return float(0.5 * distances[:, 1].min() / sine) ** 2
 
 
 def _growth_to(squared: np.ndarray, total: float) -> float:

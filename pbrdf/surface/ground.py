@@ -9,11 +9,12 @@ from scipy.optimize import brentq
 
 from pbrdf.kernels import clipping
 from pbrdf.surface.heightmap import HeightMap
+from pbrdf.surface.periodic import nearest, wrapped
 from pbrdf.surface.shapes import Shape
 
 # Azimuths for one period of the grid along the rim of the body, and their bounds
-AZIMUTHS_PER_CELL = 2.0
-FEWEST, MOST = 64, 1024
+AZIMUTHS_PER_CELL = 4.0
+FEWEST, MOST = 512, 2048
 # A body that floats free has this share of its size to the surface
 TOUCH = 1e-12
 
@@ -76,6 +77,18 @@ class Ground:
         """Share of the surface that is steeper than a slope. [1]"""
         return float(clipping.steep_share(*self._grid, slope))
 
+    def wrapped(self, places: np.ndarray) -> np.ndarray:
+        """Move places (..., 2) into the period; on a finite map they stay. [um]"""
+        if not self.surface.periodic:
+            return places
+        return wrapped(places, np.asarray(self.surface.size))
+
+    def nearest(self, offsets: np.ndarray) -> np.ndarray:
+        """Offsets (..., 2) to the nearest images; on a finite map they stay. [um]"""
+        if not self.surface.periodic:
+            return offsets
+        return nearest(offsets, np.asarray(self.surface.size))
+
     @property
     def _grid(self) -> tuple[np.ndarray, bool, float, float]:
         return self.surface.heights, self.surface.periodic, *self.surface.spacing
@@ -117,10 +130,16 @@ class Ground:
             return Rest(z, shape.volume, 0.0, 0.0)
         # The plane of the drop lies between the lowest and the highest point
         margin = 1e-6 * shape.height
-        found = clipping.settled_height(
-            *self._grid, self.lowest, shape.slabs, x, y, shape.sunk_volume,
-            self.lowest - margin, self.highest + margin, self.azimuths(shape.radius),
-        )  # fmt: skip
+        low, high = self.lowest - margin, self.highest + margin
+        azimuths = self.azimuths(shape.radius)
+        start = 0.5 * (low + high)
+        # Most of the way with few azimuths, the rest with all
+        for count in (azimuths // 8, azimuths):
+            found = clipping.settled_height(
+                *self._grid, self.lowest, shape.slabs, x, y, shape.volume,
+                shape.sunk_volume, low, high, start, count,
+            )  # fmt: skip
+            start = found[0]
         return Rest(*map(float, found))
 
     def fill_level(self, thickness: float) -> tuple[float, float]:

@@ -142,11 +142,9 @@ def _touching_in_space(
     """Keep the pairs whose bodies overlap at some height."""
     kept = []
     for one, other in pairs:
-        off_x, off_y = population.separation(
-            ground, x[one], y[one], np.array([[x[other], y[other]]])
-        )
+        off = ground.nearest(np.array([x[other] - x[one], y[other] - y[one]]))
         rise = rests[other].z - rests[one].z
         reach = contact_depth(shapes[one], shapes[other], rise)
-        kept.append(float(np.hypot(off_x[0], off_y[0])) < reach)
+        kept.append(float(np.hypot(*off)) < reach)
     found: np.ndarray = pairs[np.array(kept, dtype=bool)]
     return found

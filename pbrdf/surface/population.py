@@ -23,18 +23,6 @@ def relative_radii(number: int, spread: float, rng: np.random.Generator) -> np.n
     return np.exp(spread * rng.standard_normal(number))
 
 
-def separation(
-    ground: Ground, x: float, y: float, others: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Distances from (x, y) to the nearest images of others, (N, 2), along x and y."""
-    off_x, off_y = others[:, 0] - x, others[:, 1] - y
-    if ground.surface.periodic:
-        length_x, length_y = ground.surface.size
-        off_x = off_x - length_x * np.round(off_x / length_x)
-        off_y = off_y - length_y * np.round(off_y / length_y)
-    return off_x, off_y
-
-
 def scatter(
     ground: Ground,
     radii: np.ndarray,
@@ -66,15 +54,15 @@ def scatter(
     """
     number = len(radii)
     places, extent = np.empty((number, 2)), np.empty(number)
-    low, span = np.zeros(2), np.asarray(ground.surface.size)
+    span = np.asarray(ground.surface.size)
     order = np.argsort(-radii, kind="stable")
     for count, body in enumerate(order):
         taken = order[:count]
         margin = 0.0 if ground.surface.periodic else radii[body]
         for _ in range(TRIES):
-            x, y = low + margin + (span - 2 * margin) * rng.random(2)
-            off_x, off_y = separation(ground, x, y, places[taken])
-            room = np.hypot(off_x, off_y) - extent[taken]
+            x, y = margin + (span - 2 * margin) * rng.random(2)
+            off = ground.nearest(places[taken] - (x, y))
+            room = np.hypot(*off.T) - extent[taken]
             if (room < radii[body]).any():
                 continue
             full = reach(int(body), float(x), float(y))
@@ -101,14 +89,11 @@ def scatter(
 def overlapping(ground: Ground, axes: np.ndarray, reach: np.ndarray) -> np.ndarray:
     """Pairs of circles that overlap on the surface, shape (pairs, 2), the deepest first."""
     box = ground.surface.size if ground.surface.periodic else None
-    points = axes % np.asarray(box) if box is not None else axes
+    points = ground.wrapped(axes)
     tree = cKDTree(points, boxsize=box)
     pairs = tree.query_pairs(2 * float(reach.max()), output_type="ndarray")
-    off_x, off_y = points[pairs[:, 1]].T - points[pairs[:, 0]].T
-    if box is not None:
-        off_x = off_x - box[0] * np.round(off_x / box[0])
-        off_y = off_y - box[1] * np.round(off_y / box[1])
-    depth = np.hypot(off_x, off_y) / (reach[pairs[:, 0]] + reach[pairs[:, 1]])
+    off = ground.nearest(points[pairs[:, 1]] - points[pairs[:, 0]])
+    depth = np.hypot(*off.T) / (reach[pairs[:, 0]] + reach[pairs[:, 1]])
     order = np.lexsort((pairs[:, 1], pairs[:, 0], depth))
     hit: np.ndarray = pairs[order][depth[order] < 1.0]
     return hit

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 
-from pbrdf.kernels.clipping import moment_below, radius_squared, widest_above
+from pbrdf.kernels.clipping import moment_between, radius_squared, widest_above
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,17 +46,17 @@ class Shape:
     @cached_property
     def whole_volume(self) -> float:
         """Volume of the whole body. [um³]"""
-        return float(2 * np.pi * moment_below(self.slabs, self.height))
+        return float(2 * np.pi * moment_between(self.slabs, self.bottom, self.height))
 
     @cached_property
     def sunk_volume(self) -> float:
         """Volume of the part under the plane. [um³]"""
-        return float(2 * np.pi * moment_below(self.slabs, 0.0))
+        return float(2 * np.pi * moment_between(self.slabs, self.bottom, 0.0))
 
-    @property
+    @cached_property
     def volume(self) -> float:
         """Volume above the plane. [um³]"""
-        return self.whole_volume - self.sunk_volume
+        return float(2 * np.pi * moment_between(self.slabs, 0.0, self.height))
 
 
 def sphere(radius: float, centre: float) -> Shape:
@@ -72,7 +72,13 @@ def cap(volume: float, contact_angle: float) -> Shape:
     The body is the whole sphere, of which the plane leaves the cap.
     """
     radius = float(cap_radius(volume, contact_angle))
-    return sphere(radius, -radius * np.cos(contact_angle))
+    # Both ends without cancellation: R (1 ± cos θ)
+    low = -2 * radius * np.cos(contact_angle / 2) ** 2
+    high = 2 * radius * np.sin(contact_angle / 2) ** 2
+    base = radius * np.sin(contact_angle)
+    return Shape(
+        np.array([[low, high, base**2, -2 * radius * np.cos(contact_angle), -1.0]])
+    )
 
 
 def cap_volume(radius: npt.ArrayLike, contact_angle: npt.ArrayLike) -> np.ndarray:
