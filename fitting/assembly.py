@@ -67,6 +67,7 @@ def assemble(
     _check_names(adapter, observations.geometry, free, others)
     layout = Layout.of(free, observations, question.separate)
     parameters = _parameters(adapter, observations, layout, question.bounds, known)
+    parameters = _with_squares(parameters, layout, observations)
     prediction = predict(
         adapter, observations, layout, fixed=held, aperture=question.aperture
     )
@@ -223,6 +224,21 @@ def _within(
         )
         raise ValueError(msg)
     return low, high
+
+
+def _with_squares(
+    parameters: tuple[Parameter, ...], layout: Layout, observations: Observations
+) -> tuple[Parameter, ...]:
+    """Mark kappa where the readings depend on its square alone.
+
+    An index and its conjugate reflect alike but for the sign of the retardance.
+    """
+    if any(name[1:].count("3") == 1 for name in observations.names):
+        return parameters
+    return tuple(
+        replace(parameter, squared=base == "kappa" and np.isinf(parameter.prior_stderr))
+        for parameter, base in zip(parameters, layout.base, strict=True)
+    )
 
 
 def _off_bounds(parameter: Parameter) -> Parameter:

@@ -6,6 +6,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from fitting.descent import descend
+from fitting.newton import newton
 from fitting.objective import Objective, Prediction
 from fitting.solution import Solution, better, early_end
 
@@ -48,9 +50,11 @@ def solve_casadi(
     """Return the minimum nearest to the start, inside the bounds.
 
     A curve that is linear in its parameters is solved exactly as a bounded quadratic
-    programme. Any other goes to IPOPT [1]_ with the exact gradient and Hessian, restarted
-    with rescaled parameters until the cost no longer falls: its stopping test is relative
-    to the scaling, so one pass can stop a long way up a narrow valley.
+    programme. Any other is led down on the exact Jacobian; where the exact Hessian then
+    shows a minimum a few Newton steps away, those end the search. Else IPOPT [1]_ goes on
+    with exact gradient and Hessian, restarted with rescaled parameters until the cost no
+    longer falls: its stopping test is relative to the scaling, so one pass can stop a long
+    way up a narrow valley.
 
     Parameters
     ----------
@@ -75,7 +79,11 @@ def solve_casadi(
         return ended
     if objective.prediction.is_linear and objective.loss == "linear":
         return _solve_linear(objective)
-    return _solve_ipopt(objective, max_iterations, passes)
+    start, count = descend(objective)
+    found = newton(objective, start)
+    if found is None:
+        found = _solve_ipopt(objective.started_at(start), max_iterations, passes)
+    return replace(found, n_evaluations=found.n_evaluations + count)
 
 
 def refine_casadi(objective: Objective) -> Solution:
@@ -121,15 +129,24 @@ def _pass(
 ) -> tuple[Solution, int]:
     """Run IPOPT once from `begin` and return where it ended, and how often it looked."""
     norm = begin.cost if begin.cost > 0.0 else 1.0
+    squared = _squared(objective)
+    # A step of the same length for a parameter of which the square is varied
+    units = np.where(squared, scale * (2.0 * np.abs(begin.x) + scale), scale)
+
+    def inwards(x: np.ndarray) -> np.ndarray:
+        return np.asarray(np.where(squared, x * np.abs(x), x) / units)
+
     answer = solver(
-        x0=begin.x / scale,
-        p=np.concatenate([objective.numbers, scale, [norm]]),
-        lbx=objective.low / scale,
-        ubx=objective.high / scale,
+        x0=inwards(begin.x),
+        p=np.concatenate([objective.numbers, units, [norm]]),
+        lbx=inwards(objective.low),
+        ubx=inwards(objective.high),
     )
     stats = solver.stats()
     count = stats.get("n_call_nlp_f", 0)
-    x = np.clip(answer["x"].full().ravel() * scale, objective.low, objective.high)
+    u = answer["x"].full().ravel() * units
+    u = np.where(squared, np.sqrt(np.abs(u)), u)
+    x = np.clip(u, objective.low, objective.high)
     if not np.isfinite(x).all():
         return begin, count
     x = _snapped(objective, x)
@@ -138,6 +155,11 @@ def _pass(
     converged = status.startswith("converged")
     cost = objective.cost(x)
     return replace(begin, x=x, cost=cost, converged=converged, status=status), count
+
+
+def _squared(objective: Objective) -> np.ndarray:
+    """Tell which parameters the solver varies by their square, shape (n,)."""
+    return np.array([parameter.squared for parameter in objective.parameters])
 
 
 def _snapped(objective: Objective, x: np.ndarray) -> np.ndarray:
@@ -165,20 +187,24 @@ def _ipopt(
     import casadi
 
     cache = _SOLVERS.setdefault(objective.prediction, {})
-    key = f"{objective.loss} {max_iterations} {gauss_newton}"
+    squared = _squared(objective)
+    key = f"{objective.loss} {max_iterations} {gauss_newton} {squared.tolist()}"
     if key not in cache:
         expressions = objective.expressions
         n = expressions.x.numel()
         u, scale, norm = casadi.MX.sym("u", n), casadi.MX.sym("s", n), casadi.MX.sym("c")
-        cost = casadi.substitute(expressions.cost, expressions.x, u * scale)
+        entries = casadi.vertsplit(u * scale)
+        x = casadi.vertcat(
+            *(casadi.sqrt(v) if s else v for v, s in zip(entries, squared, strict=True))
+        )
+        cost = casadi.substitute(expressions.cost, expressions.x, x)
         p = casadi.vertcat(expressions.p, scale, norm)
         options: dict[str, Any] = {**_IPOPT_OPTIONS, "ipopt.max_iter": max_iterations}
         if gauss_newton:
             weight, none = casadi.MX.sym("w"), casadi.MX.sym("g", 0)
-            curvature = casadi.substitute(
-                expressions.gauss_newton, expressions.x, u * scale
-            )
-            hessian = weight / norm * curvature * (scale @ scale.T)
+            curvature = casadi.substitute(expressions.gauss_newton, expressions.x, x)
+            slope = casadi.jacobian(x, u)
+            hessian = weight / norm * slope.T @ curvature @ slope
             options["hess_lag"] = casadi.Function(
                 "nlp_hess_l",
                 [u, p, weight, none],

@@ -143,6 +143,14 @@ class Expressions:
         self.value_gradient = casadi.Function("cost", arguments, [self.cost, gradient])
 
     @cached_property
+    def hessian(self) -> "casadi.Function":
+        """(x, p) -> exact Hessian of the cost."""
+        import casadi
+
+        hessian, _ = casadi.hessian(self.cost, self.x)
+        return casadi.Function("hessian", [self.x, self.p], [hessian])
+
+    @cached_property
     def gauss_newton(self) -> "casadi.MX":
         """J^T D J with D = rho'(r^2), the Hessian without the curvature of the model."""
         import casadi

@@ -24,6 +24,9 @@ class Parameter:
         A change that matters; the solvers work in units of it where `value` is 0.
     prior_value, prior_stderr : float
         Gaussian knowledge from elsewhere; `prior_stderr` is inf where there is none.
+    squared : bool
+        True if only its square acts, as kappa's in all elements but those that mix linear
+        and circular light: at 0 the curve then is flat in the parameter, not in its square.
 
     Raises
     ------
@@ -38,6 +41,7 @@ class Parameter:
     scale: float = 1.0
     prior_value: float = 0.0
     prior_stderr: float = np.inf
+    squared: bool = False
 
     def __post_init__(self) -> None:
         if not self.low <= self.high:
