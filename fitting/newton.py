@@ -1,4 +1,4 @@
-"""The last steps to a minimum, and the proof that it is one: Newton on the exact Hessian."""
+"""The last steps to a minimum, and the proof that it is one, on the exact Hessian."""
 
 import numpy as np
 

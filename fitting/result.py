@@ -13,6 +13,8 @@ from fitting.estimate import Estimate
 if TYPE_CHECKING:
     import xarray as xr
 
+    from fitting.likelihood import LikelihoodProfile
+    from fitting.parameters import Parameter
     from fitting.problem import Problem
 
 __all__ = ["FitResult"]
@@ -117,17 +119,43 @@ class FitResult:
 
     @property
     def estimates(self) -> dict[str, Estimate]:
-        """Each parameter as value, standard error and symmetric 95 % interval.
+        """Each parameter as value, standard error and 95 % interval.
 
-        Cut at the bounds. `profile` gives intervals that may be lopsided or open.
+        The interval is symmetric, or where a bound is within reach that of `profiles`.
         """
         found = {}
-        for parameter in self.problem.objective.parameters:
-            value, stderr = self.values[parameter.name], self.stderr[parameter.name]
+        for name, value in self.values.items():
+            stderr = self.stderr[name]
             half = self.quantile(0.95) * stderr
-            low, high = max(value - half, parameter.low), min(value + half, parameter.high)
-            found[parameter.name] = Estimate(value, stderr, low, high)
+            low, high = value - half, value + half
+            if name in self.profiles:
+                low, high = self.profiles[name].low, self.profiles[name].high
+            found[name] = Estimate(value, stderr, low, high)
         return found
+
+    @cached_property
+    def profiles(self) -> "dict[str, LikelihoodProfile]":
+        """Likelihood intervals of the parameters that a bound cuts off, by name."""
+        from fitting.likelihood import profile_likelihood
+
+        if not self.converged:
+            return {}
+        return {
+            parameter.name: profile_likelihood(self, parameter.name)
+            for parameter in self.problem.objective.parameters
+            if self._near_bound(parameter)
+        }
+
+    def _near_bound(self, parameter: "Parameter") -> bool:
+        """Tell whether an end of the symmetric interval would not be inside the bounds."""
+        value, stderr = self.values[parameter.name], self.stderr[parameter.name]
+        if not np.isfinite(stderr) or parameter.low == parameter.high:
+            return False
+        room = min(value - parameter.low, parameter.high - value)
+        # What acts by its square is lopsided from further off
+        return bool(
+            room < (2.0 if parameter.squared else 1.0) * self.quantile(0.95) * stderr
+        )
 
     def quantile(self, level: float) -> float:
         """Return the half width of a `level` interval in standard errors.
@@ -164,7 +192,10 @@ class FitResult:
         width = max(len(name) for name in self.values)
         lines = [f"{self.status} ({self.solver}, {self.n_evaluations} evaluations)"]
         for name, value in self.values.items():
-            lines.append(f"  {name:<{width}} = {_pair(value, self.stderr[name])}")
+            text = _pair(value, self.stderr[name])
+            if name in self.profiles:
+                text = f"{text} ({self.profiles[name].interval})"
+            lines.append(f"  {name:<{width}} = {text}")
         quality = "made to fit" if self.n_estimated else f"p = {self.p_value:.2g}"
         lines.append(f"  chi2 / dof = {self.chi2:.4g} / {self.dof} ({quality})")
         lines.append(f"  noise: {self.noise}")
@@ -180,7 +211,11 @@ class FitResult:
             "solver": self.solver,
             "n_evaluations": self.n_evaluations,
             "parameters": {
-                name: {key: _number(value) for key, value in estimate.as_dict().items()}
+                name: {
+                    **{key: _number(v) for key, v in estimate.as_dict().items()},
+                    "low_open": name in self.profiles and self.profiles[name].low_open,
+                    "high_open": name in self.profiles and self.profiles[name].high_open,
+                }
                 for name, estimate in self.estimates.items()
             },
             "stderr_parts": {
