@@ -22,7 +22,7 @@ from pbrdf.tracer.plan import Moments, Plan, Tally
 from pbrdf.tracer.skips import chosen_skips, explanation
 from pbrdf.tracer.trace import prepare, trace_sample
 from pbrdf.tracer.world import WetField, contaminant_materials, media_of
-from pbrdf.validity import geometric_optics_warnings
+from pbrdf.validity import contamination_warnings, geometric_optics_warnings
 
 STOKES_COUNT = {"full": 4, "linear": 3, "unpolarized": 1}
 # A fixed surface has no realisations; its rays are dealt to this many independent batches
@@ -186,9 +186,9 @@ def simulate(  # noqa: PLR0913  (the public signature)
         enough = moments.samples >= max(samples, 2)
         if target is not None and enough and moments.rel_error() <= target:
             break
-    for note in moments.notes:
+    for note in (late := _contamination_notes(moments, waves)):
         warnings.warn(note, AccuracyWarning, stacklevel=2)
-    notes += moments.notes
+    notes += late
     return to_dataset(
         moments,
         scene,
@@ -209,6 +209,14 @@ def simulate(  # noqa: PLR0913  (the public signature)
             "warnings": notes,
         },
     )
+
+
+def _contamination_notes(moments: Moments, waves: np.ndarray | None) -> list[str]:
+    """Warnings of what lies on the surface, known after the first sample."""
+    late = list(moments.notes)
+    for wave in () if waves is None else np.atleast_1d(waves):
+        late += contamination_warnings(moments.reports, float(wave))
+    return late
 
 
 def _varies(scene: Scene) -> bool:

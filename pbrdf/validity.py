@@ -1,8 +1,16 @@
 """Where geometric optics stops to hold for a rough surface; warnings, never corrections."""
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 import numpy as np
 
 from pbrdf.surface import GaussianSurface, MeasuredSurface
+
+# Size parameter 2 π R / λ from which reflection and refraction hold to 1 %
+LEAST_SIZE_PARAMETER = 400.0
+# Bandwidth of a filter radiometer, where nothing is known of the detector [um]
+BANDWIDTH = 0.01
 
 
 def geometric_optics_warnings(
@@ -36,4 +44,49 @@ def geometric_optics_warnings(
         found.append(
             f"corr_length {length:.3g} um is below the wavelength {wavelength:g} um."
         )
+    return found
+
+
+def contamination_warnings(
+    reports: Sequence[Mapping[str, Any]], wavelength: float, bandwidth: float = BANDWIDTH
+) -> list[str]:
+    """Say which limits of geometric optics drops, spheres and films break.
+
+    Parameters
+    ----------
+    reports : sequence of mappings
+        What contaminants became, from `pbrdf.surface.place`.
+    wavelength, bandwidth : float
+        Of the light; films are coherent within its coherence length λ²/Δλ. [um]
+
+    Notes
+    -----
+    A drop or sphere needs a size parameter 2πR/λ of about 400 for 1 % in reflection and
+    refraction, more for rainbows. A film needs 2 n d above three coherence lengths; n is
+    taken as 4/3.
+
+    Examples
+    --------
+    >>> print(*contamination_warnings([{"kind": "film", "thickness": 10.0}], 0.55))
+    A film of 10 um is thinner than 34 um, three coherence lengths at 0.55 um and a \
+bandwidth of 0.01 um: it interferes, which geometric optics does not know.
+    """
+    found = []
+    for report in reports:
+        radius = report.get("curvature_radius")
+        if radius is not None and 2 * np.pi * radius < LEAST_SIZE_PARAMETER * wavelength:
+            found.append(
+                f"The median radius of curvature of {report['kind']}, {radius:.3g} um, has "
+                f"a size parameter of {2 * np.pi * radius / wavelength:.3g} at "
+                f"{wavelength:g} um; geometric optics holds to 1 % above "
+                f"{LEAST_SIZE_PARAMETER:g}, and rainbows need more."
+            )
+        thickness = report.get("thickness")
+        least = 3 * wavelength**2 / (2 * 4 / 3 * bandwidth)
+        if thickness is not None and thickness < least:
+            found.append(
+                f"A film of {thickness:.3g} um is thinner than {least:.2g} um, three "
+                f"coherence lengths at {wavelength:g} um and a bandwidth of "
+                f"{bandwidth:g} um: it interferes, which geometric optics does not know."
+            )
     return found

@@ -198,6 +198,11 @@ class Drops:
             )
             raise ValueError(msg)
 
+    @property
+    def random(self) -> bool:
+        """Whether they are drawn anew for every sample."""
+        return self.positions is None and self.seed is None and self.contact_angle > 0.0
+
     def settle(self, ground: Ground, seed: np.random.SeedSequence) -> Settled:
         """Lay them on a surface; `seed` is used where they have none of their own."""
         if self.seed is not None:
@@ -236,6 +241,7 @@ class Drops:
             "coverage_wetted": float(sum(rest.wetted for rest in rests) / ground.area),
             "coverage_projected": float(seen / ground.area),
             "contact_angle": maker.contact_angle,
+            "curvature_radius": float(np.median([shape.curvature for shape in shapes])),
             "largest_radius": max(shape.radius for shape in shapes),
             "flattened": sum(len(shape.slabs) > 1 for shape in shapes),
             "notes": tuple(notes),
@@ -255,6 +261,6 @@ class Drops:
         report = {
             "kind": "drops", "number": 0, "volume": volume, "volume_placed": volume,
             "coverage_wetted": 1.0, "coverage_projected": 1.0, "contact_angle": 0.0,
-            "notes": tuple(notes),
+            "thickness": self.volume_per_area, "notes": tuple(notes),
         }  # fmt: skip
         return Settled(film=(False, self.volume_per_area), report=report)

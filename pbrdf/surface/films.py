@@ -55,6 +55,7 @@ class Film:
             "coverage_wetted": wetted,
             "coverage_projected": wetted,
             "contact_angle": None,
+            "thickness": self.thickness,
             "notes": (),
         }
         return Settled(film=(self.level, value), report=report)

@@ -43,6 +43,12 @@ class Shape:
         """Largest radius above the plane. [um]"""
         return float(widest_above(self.slabs, 0.0))
 
+    @property
+    def curvature(self) -> float:
+        """Radius of curvature at the top. [um]"""
+        _, top, _, b, c = self.slabs[-1]
+        return float(-0.5 * (b + 2 * c * top))
+
     @cached_property
     def whole_volume(self) -> float:
         """Volume of the whole body. [um³]"""

@@ -132,6 +132,11 @@ class Spheres:
         radius = per_body("radius", self.radius, len(self.positions), "um")
         set_field(self, "radius", radius)
 
+    @property
+    def random(self) -> bool:
+        """Whether they are drawn anew for every sample."""
+        return self.positions is None and self.seed is None
+
     def settle(self, ground: Ground, seed: np.random.SeedSequence) -> Settled:
         """Lay them on a surface; `seed` is used where they have none of their own."""
         if self.seed is not None:
@@ -189,5 +194,6 @@ def _report(
         "coverage_wetted": sum(rest.wetted for rest in above) / ground.area,
         "coverage_projected": seen / ground.area,
         "contact_angle": None,
+        "curvature_radius": float(np.median([shape.curvature for shape in shapes])),
         "notes": (),
     }

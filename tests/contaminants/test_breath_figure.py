@@ -162,8 +162,12 @@ def test_two_contaminants_do_not_share_their_random_numbers():
 
 
 def test_amounts_that_say_too_little_or_too_much_are_refused():
-    for amount in ({}, {"coverage": 0.1}, {"volume_per_area": 1.0},
-                   {"volume_per_area": 1.0, "coverage": 0.1, "number_density": 1e-3}):  # fmt: skip
+    for amount in (
+        {},
+        {"coverage": 0.1},
+        {"volume_per_area": 1.0},
+        {"volume_per_area": 1.0, "coverage": 0.1, "number_density": 1e-3},
+    ):
         with pytest.raises(ValueError, match=r"amount must be two of volume_per_area"):
             Drops(contact_angle=1.0, **amount)
     with pytest.raises(ValueError, match=r"number_density \(of nuclei\) for a breath fig"):

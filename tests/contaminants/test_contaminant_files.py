@@ -72,7 +72,7 @@ material = { n = 1.5, kappa = 0.02 }
         ('type = "rain"', r"\[contaminants\]: type is 'rain'. Known: drops, spheres, film"),
         ("thickness_um = 1", r"\[contaminants\]: type is None"),
         ('type = "film"', r"\[contaminants film\]: key 'thickness_um' is missing"),
-        ('type = "film"\nthickness = 1', r"unknown key 'thickness'. Known: level, material"),
+        ('type = "film"\nthickness = 1', r"unknown key 'thickness'. Known: level"),
         ('type = "film"\nthickness_um = -1', r"thickness must be positive \[um\], got"),
         ('type = "film"\nthickness_um = "1 um"', r"'thickness_um' is '1 um'. Write"),
         ('type = "film"\nthickness_um = 1\nmaterial = "wter"', r"material must be one"),

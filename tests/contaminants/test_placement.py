@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import Drops, Film, GaussianSurface, HeightMap, Material, Scene, Spheres
 from pbrdf.surface import place
+from pbrdf.validity import contamination_warnings
 
 SEED = np.random.SeedSequence(5)
 ROUGH = GaussianSurface(
@@ -265,3 +266,15 @@ def test_scenes_check_contaminants():
         Spheres.at([[1.0, 2.0, 3.0]], radius=1.0, material="bk7", sink=0.5)
     with pytest.raises(ValueError, match=r"two contaminants|at most one film"):
         place([Film(thickness=1.0), Film(thickness=1.0)], flat, SEED)
+
+
+def test_small_drops_and_thin_films_are_reported_where_a_wavelength_is_known():
+    placement = place([drops(90.0, 3000.0, [[9.0, 9.0]]), Film(thickness=3.0)], ROUGH, SEED)
+    # R = 11.27 um: 2 π R / λ = 129 at 0.55 um
+    notes = contamination_warnings(placement.reports, 0.55)
+    assert "size parameter of 129 " in notes[0]
+    assert "film of 3 um" in notes[1]
+    large = place([drops(90.0, 3e5, [[9.0, 9.0]]), Film(thickness=40.0)], ROUGH, SEED)
+    assert contamination_warnings(large.reports, 0.55) == []
+    # A broad band makes thin films incoherent
+    assert len(contamination_warnings(placement.reports, 0.55, bandwidth=0.2)) == 1
