@@ -17,6 +17,7 @@ from collections import namedtuple
 import numpy as np
 
 from pbrdf.kernels import jit
+from pbrdf.kernels.horizon import is_free
 
 ESCAPED, HIT, SIDE, LOST, REACHED = 0, 1, 2, 3, 4
 FACET_LOW, FACET_HIGH = 0, 1  # the facet with u > v, and the one with u < v
@@ -27,11 +28,12 @@ START_LEVEL = 3  # blocks of 8 cells: where a ray from above starts to look
 
 # A height field as the kernels take it: node heights, the pyramid of `block_maxima`, the
 # highest node, the slope from which on a rising ray is free at once (inf: not to be used),
-# the largest slope of a facet, whether the field repeats, the grid steps and the material
-# of each cell (of no size: all 0)
+# the largest slope of a facet, whether the field repeats, the grid steps, the material of
+# each cell (of no size: all 0) and what `pbrdf.kernels.horizon` knows (of no size: nothing)
 Terrain = namedtuple(
     "Terrain",
-    "heights maxima levels z_top free_slope steepest periodic pitch_x pitch_y labels",
+    "heights maxima levels z_top free_slope steepest periodic pitch_x pitch_y labels "
+    "horizon",
 )
 
 
@@ -108,7 +110,7 @@ def facet_steps(terrain, i, j, facet):
 def facet_slopes(terrain, i, j, facet):
     """Slopes dz/dx and dz/dy of one facet of cell (i, j)."""
     step_x, step_y = facet_steps(terrain, i, j, facet)
-    return step_x / terrain.pitch_x, step_y / terrain.pitch_y
+    return step_x * (1.0 / terrain.pitch_x), step_y * (1.0 / terrain.pitch_y)
 
 
 @jit(forceinline=True)
@@ -306,12 +308,16 @@ def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, m
 def leave_facet(terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate, max_steps):
     """Follow a ray along the unit vector k from a facet to the next one it meets.
 
-    A ray that rises more steeply than any facet can meet none.
+    A ray that rises more steeply than any facet can meet none, nor one that rises above all
+    that lies ahead.
     """
-    level = math.sqrt(k_x * k_x + k_y * k_y)
-    if k_z >= terrain.free_slope * level:
+    free_slope = terrain.free_slope
+    if k_z > 0.0 and k_z * k_z >= free_slope * free_slope * (k_x * k_x + k_y * k_y):
         return ESCAPED, i, j, -1, u, v, z
-    return walk(
-        terrain, i, j, facet, u, v, z,
-        k_x / terrain.pitch_x, k_y / terrain.pitch_y, k_z, leave_rate, max_steps,
-    )  # fmt: skip
+    speed_x = k_x * (1.0 / terrain.pitch_x)
+    speed_y = k_y * (1.0 / terrain.pitch_y)
+    if terrain.horizon.size > 0 and is_free(
+        terrain.horizon, terrain.z_top, i, j, z, speed_x, speed_y, k_z
+    ):
+        return ESCAPED, i, j, -1, u, v, z
+    return walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, k_z, leave_rate, max_steps)

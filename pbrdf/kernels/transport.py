@@ -53,18 +53,48 @@ W_SX, W_SY, W_SZ, W_RATE, W_COS, W_BOUNCE, N_WAITING = 9, 10, 11, 12, 13, 14, 15
 
 @jit(forceinline=True)
 def reflect(k_x, k_y, k_z, slope_x, slope_y):
-    """Mirror direction at a facet, the facet's normal and the cosine of incidence."""
+    """Mirror direction at a facet, the facet's normal and the cosine of incidence.
+
+    The normal comes with 1 / n_z, its length before it was made a unit vector.
+    """
     length = math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
-    n_x = -slope_x / length
-    n_y = -slope_y / length
     n_z = 1.0 / length
+    n_x = -slope_x * n_z
+    n_y = -slope_y * n_z
     cos_beta = max(-(k_x * n_x + k_y * n_y + k_z * n_z), GRAZING)
     r_x = k_x + 2.0 * cos_beta * n_x
     r_y = k_y + 2.0 * cos_beta * n_y
     r_z = k_z + 2.0 * cos_beta * n_z
-    # Keep the direction a unit vector over any number of bounces
-    scale = 1.0 / math.sqrt(r_x * r_x + r_y * r_y + r_z * r_z)
-    return r_x * scale, r_y * scale, r_z * scale, n_x, n_y, n_z, cos_beta
+    # Keep the direction a unit vector over any number of bounces: one step of Newton's
+    # rule for 1 / sqrt(r . r), which is 1 but for rounding
+    scale = 1.5 - 0.5 * (r_x * r_x + r_y * r_y + r_z * r_z)
+    return r_x * scale, r_y * scale, r_z * scale, n_x, n_y, n_z, length, cos_beta
+
+
+@jit(forceinline=True)
+def mirror(k_x, k_y, k_z, slope_x, slope_y):
+    """Reflect a beam at a facet.
+
+    Returns the new direction, the s axis k x n of the facet, the same before and after (not
+    of unit length: only its direction counts), the speed at which the ray leaves the facet
+    upwards and the cosine of incidence.
+    """
+    r_x, r_y, r_z, n_x, n_y, n_z, length, cos_beta = reflect(
+        k_x, k_y, k_z, slope_x, slope_y
+    )
+    w_x = k_y * n_z - k_z * n_y
+    w_y = k_z * n_x - k_x * n_z
+    w_z = k_x * n_y - k_y * n_x
+    # It leaves the plane as fast as it came, cos(beta) along the normal
+    return r_x, r_y, r_z, w_x, w_y, w_z, cos_beta * length, cos_beta
+
+
+@jit(forceinline=True)
+def new_axis(s_x, s_y, s_z, w_x, w_y, w_z):
+    """Axis w of a facet, or the old s axis where the beam met the facet head-on."""
+    if w_x * w_x + w_y * w_y + w_z * w_z > PARALLEL:
+        return w_x, w_y, w_z
+    return s_x, s_y, s_z
 
 
 @jit(forceinline=True)
@@ -74,19 +104,11 @@ def bounce(k_x, k_y, k_z, s_x, s_y, s_z, slope_x, slope_y):
     Returns the new direction, the new s axis, the speed at which the ray leaves the facet
     upwards, the cosine of incidence and the turn of the frame into the plane of incidence.
     """
-    r_x, r_y, r_z, n_x, n_y, n_z, cos_beta = reflect(k_x, k_y, k_z, slope_x, slope_y)
-    # The s axis of the facet is k x n, the same before and after
-    w_x = k_y * n_z - k_z * n_y
-    w_y = k_z * n_x - k_x * n_z
-    w_z = k_x * n_y - k_y * n_x
+    r_x, r_y, r_z, w_x, w_y, w_z, leave_rate, cos_beta = mirror(
+        k_x, k_y, k_z, slope_x, slope_y
+    )
     c2, s2 = turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, w_x, w_y, w_z)
-    square = w_x * w_x + w_y * w_y + w_z * w_z
-    if square > PARALLEL:
-        scale = 1.0 / math.sqrt(square)
-        s_x = w_x * scale
-        s_y = w_y * scale
-        s_z = w_z * scale
-    leave_rate = max(r_z - slope_x * r_x - slope_y * r_y, GRAZING)
+    s_x, s_y, s_z = new_axis(s_x, s_y, s_z, w_x, w_y, w_z)
     return r_x, r_y, r_z, s_x, s_y, s_z, leave_rate, cos_beta, c2, s2
 
 
@@ -151,6 +173,8 @@ def trace_ray(
     max_bounces = record.shape[0] - 1
     splits = optics.base.shape[1] > 0
     gathers = spectra.sums.size > 0
+    # The turns out of the source's frame and into the detector's do not touch M00
+    polarised = optics.n_stokes > 1
     if not gathers:
         for w in range(tally.energy.shape[0]):
             tally.energy[w, ABSORBED] += 1.0
@@ -186,11 +210,17 @@ def trace_ray(
                     waiting[n_waiting, W_RATE], waiting[n_waiting, W_COS],
                 ) = scatter(slope_x, slope_y, draw_a, draw_b)  # fmt: skip
                 n_waiting += 1
-            (
-                k_x, k_y, k_z, s_x, s_y, s_z, leave_rate,
-                record[bounces, 0, COS_IN],
-                record[bounces, 0, TURN_C], record[bounces, 0, TURN_S],
-            ) = bounce(k_x, k_y, k_z, s_x, s_y, s_z, slope_x, slope_y)  # fmt: skip
+            r_x, r_y, r_z, w_x, w_y, w_z, leave_rate, cos_beta = mirror(
+                k_x, k_y, k_z, slope_x, slope_y
+            )
+            c2, s2 = 1.0, 0.0
+            if polarised or bounces > 0:
+                c2, s2 = turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, w_x, w_y, w_z)
+            s_x, s_y, s_z = new_axis(s_x, s_y, s_z, w_x, w_y, w_z)
+            k_x, k_y, k_z = r_x, r_y, r_z
+            record[bounces, 0, COS_IN] = cos_beta
+            record[bounces, 0, TURN_C] = c2
+            record[bounces, 0, TURN_S] = s2
             record[bounces, 0, COS_OUT] = SPECULAR
             record[bounces, 0, LABEL] = labels[i, j] if labels.size > 0 else 0
             bounces += 1
@@ -199,9 +229,11 @@ def trace_ray(
                 terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate, MAX_STEPS
             )
 
-        record[bounces, 0, TURN_C], record[bounces, 0, TURN_S] = exit_turn(
-            k_x, k_y, k_z, s_x, s_y, s_z, cos_phi, sin_phi
-        )
+        c2, s2 = 1.0, 0.0
+        if polarised:
+            c2, s2 = exit_turn(k_x, k_y, k_z, s_x, s_y, s_z, cos_phi, sin_phi)
+        record[bounces, 0, TURN_C] = c2
+        record[bounces, 0, TURN_S] = s2
         end = N_LEAKED
         if fate == HIT:
             end = N_TRUNCATED

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrdf.kernels.heightfield import Terrain, block_maxima, steepest_slope
+from pbrdf.kernels.horizon import build_horizon
 from pbrdf.surface.heightmap import HeightMap
 
 # A finite map keeps a rim this many height ranges wide free of entry points, at most an
@@ -47,6 +48,9 @@ class Field:
             periodic=surface.periodic,
             pitch_x=surface.spacing[0],
             pitch_y=surface.spacing[1],
+            horizon=build_horizon(
+                surface.heights, surface.periodic, float(surface.heights.max())
+            ),
             labels=NO_LABELS if surface.labels is None else surface.labels,
         )
         return cls(terrain=terrain, z_bottom=float(surface.heights.min()))

@@ -5,12 +5,15 @@ Each skip is exact, and each can be switched off by its name, so that a test can
 
 from collections.abc import Iterable
 
+from pbrdf.kernels.fresnel_table import TOLERANCE
+from pbrdf.kernels.horizon import BLOCK
 from pbrdf.tracer.plan import Plan
 
 SKIPS = {
     "walk": "rays over a height field need no mesh and no tree: an exact walk follows them",
     "sweep": "first hits on a periodic surface need no search: one pass a line finds them",
     "steep": "a ray that rises more steeply than every facet is not traced",
+    "horizon": "a ray that rises above all that lies ahead of it is not traced",
     "spectra": "many wavelengths: single bounces are summed by bin and shaded once a bin",
 }
 
@@ -44,20 +47,10 @@ def explanation(plan: Plan, *, periodic: bool, steepest: float) -> list[str]:
     steepest : float
         Largest slope of a facet of one sample of the surface. [1]
     """
-    lines = []
     if "walk" in plan.skips:
-        lines.append("Embree: not built; an exact float64 walk settles every ray.")
-        if "sweep" in plan.skips and periodic:
-            lines.append(
-                "Search for first hits: none; one pass along each line finds them."
-            )
-        if "steep" in plan.skips:
-            lines.append(
-                "Rays rising above the steepest facet of the first sample, a slope of "
-                f"{steepest:.3g}: not traced."
-            )
+        lines = _about_the_walk(plan.skips, periodic, steepest)
     else:
-        lines.append("Nothing skipped: Embree traces every ray.")
+        lines = ["Nothing skipped: Embree traces every ray."]
     if plan.base.shape[1] == 0:
         lines.append("Diffuse base: none, so no path is split; nothing is transmitted.")
     if plan.max_bounces < 3:
@@ -70,4 +63,26 @@ def explanation(plan: Plan, *, periodic: bool, steepest: float) -> list[str]:
         lines.append("All but M00: not computed (paths stay polarised inside).")
     if len(plan.n) > 1:
         lines.append(f"Tracing for {len(plan.n) - 1} of {len(plan.n)} wavelengths: shared.")
+    if plan.spectrum is not None:
+        lines.append(
+            "Single bounces: summed by bin, and shaded once a bin and wavelength, to "
+            f"{TOLERANCE:g} of M00."
+        )
+    return lines
+
+
+def _about_the_walk(skips: frozenset[str], periodic: bool, steepest: float) -> list[str]:
+    lines = ["Embree: not built; an exact float64 walk settles every ray."]
+    if "sweep" in skips and periodic:
+        lines.append("Search for first hits: none; one pass along each line finds them.")
+    if "steep" in skips:
+        lines.append(
+            "Rays rising above the steepest facet of the first sample, a slope of "
+            f"{steepest:.3g}: not traced."
+        )
+    if "horizon" in skips:
+        lines.append(
+            "Rays rising above all that lies ahead in their octant, by blocks of "
+            f"{BLOCK} cells: not traced."
+        )
     return lines

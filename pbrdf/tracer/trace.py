@@ -8,6 +8,7 @@ from pbrdf.kernels import shading
 from pbrdf.kernels.beams import N_STATE, Room
 from pbrdf.kernels.binning import bin_edges
 from pbrdf.kernels.entry import Source
+from pbrdf.kernels.horizon import NO_HORIZON
 from pbrdf.kernels.spectra import shade_gathered
 from pbrdf.kernels.transparent import N_HIT, trace_among_bodies
 from pbrdf.kernels.transport import N_WAITING, sweep_batch, trace_batch
@@ -22,8 +23,12 @@ from pbrdf.tracer.world import WetField
 def prepare(surface: HeightMap, skips: frozenset[str]) -> Field | EmbreeField:
     """Make a surface ready for tracing with the skips allowed: the walk, or else Embree."""
     field = Field.of(surface)
+    terrain = field.terrain
     if "steep" not in skips:
-        field = replace(field, terrain=field.terrain._replace(free_slope=np.inf))
+        terrain = terrain._replace(free_slope=np.inf)
+    if "horizon" not in skips:
+        terrain = terrain._replace(horizon=NO_HORIZON)
+    field = replace(field, terrain=terrain)
     return field if "walk" in skips else EmbreeField.of(field)
 
 
