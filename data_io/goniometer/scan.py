@@ -20,6 +20,8 @@ _WAVELENGTH_RANGE = (0.01, 100.0)
 # Two columns of one quantity may differ by rounding and noise
 _DOLP_TOLERANCE = 0.05
 _SAME_DEG = 1e-6
+# Part of the brightest reading below which noise may exceed the signal
+_DARK = 1e-3
 
 CONVENTIONS = (
     "Angles in rad, dphi = phi_s - phi_i, specular at dphi = pi. "
@@ -139,6 +141,19 @@ def _check_angles(scan: Scan) -> None:
                 "like radians"
             )
             raise scan.fault(values == values.max(), column, problem, cure)
+    # 0.5236 is no incidence that one sets in degrees; in radians it is 30 degrees
+    turned = np.degrees(scan.theta_i)
+    round_as_radians = np.abs(turned - 5 * np.rint(turned / 5)) < 0.06
+    fine_as_degrees = np.abs(100 * scan.theta_i - np.rint(100 * scan.theta_i)) > 1e-6
+    small = (scan.theta_i > 0) & (scan.theta_i < _RADIAN_LIMIT_DEG)
+    looks_radian = small & round_as_radians & fine_as_degrees
+    if looks_radian.any():
+        row = int(np.argmax(looks_radian))
+        problem = (
+            f"expected degrees, got {scan.theta_i[row]:.6g}, which looks like "
+            f"{turned[row]:.0f} degrees in radians"
+        )
+        raise scan.fault(looks_radian, "theta_i", problem, cure)
     # pi/2, pi and 3 pi/2 do not occur by chance in degrees
     quarters = np.abs(scan.dphi[:, None] - np.array([0.5, 1, 1.5, 2]) * np.pi).min(axis=1)
     looks_radian = (quarters < 2e-3) & (np.abs(scan.dphi) <= 2 * np.pi + 2e-3)
@@ -202,6 +217,31 @@ def _check_normalisation(scan: Scan) -> None:
             )
             cure = "Elements divided by M00 must be multiplied by it."
             raise scan.fault(larger, name, problem, cure)
+        impossible = _beyond(scan, name, intensity)
+        if impossible.any():
+            row = int(np.argmax(impossible))
+            problem = (
+                f"expected at most M00 = {intensity[row]:.6g} in size, got "
+                f"{scan.values[name][row]:.6g}, which no surface reflects"
+            )
+            raise scan.fault(impossible, name, problem, f"Mend the row. {_LEAVE}")
+
+
+def _beyond(scan: Scan, name: str, intensity: np.ndarray) -> np.ndarray:
+    """Tell where an element exceeds M00 by more than its error can explain.
+
+    Where the file states no errors, a factor of two above what a detector still sees.
+    """
+    size = np.abs(scan.values[name])
+    nothing = np.zeros(size.size)
+    error = np.hypot(
+        np.nan_to_num(scan.values.get(name + STDERR, nothing)),
+        np.nan_to_num(scan.values.get("M00" + STDERR, nothing)),
+    )
+    floor = _DARK * np.nanmax(intensity, initial=0.0)
+    stated = size > 1.02 * intensity + 5.0 * error
+    unstated = size > 2.0 * intensity + floor
+    return np.asarray(np.where(error > 0.0, stated, unstated))
 
 
 def _check_dolp(scan: Scan) -> None:

@@ -166,6 +166,9 @@ FULL = "theta_i_deg,theta_s_deg,dphi_deg,M00"
         (f"{VIEW}\n30,-91,1\n", "column theta_view_deg: .*got 91"),
         (f"{FULL}\n30,10,7200,1\n", "column dphi_deg: .*got 7200"),
         (f"{VIEW}\n30,-1.2,1\n30,0,1\n30,0.6,1\n", "line 2, column theta_view_deg: expected degrees.*radians"),
+        (f"{VIEW}\n30,-20,1\n0.5236,20,1\n", "line 3, column theta_i_deg: expected degrees, got 0.5236, which looks like 30 degrees in radians"),
+        (f"{VIEW},M10\n30,10,1,0.1\n30,20,1,-7\n30,30,1,0.2\n", "line 3, column M10: expected at most M00 = 1 in size, got -7, which no surface reflects"),
+        (f"{VIEW},M11,M11_stderr\n30,10,1,0.9,0.01\n30,20,1,1.2,0.03\n30,30,1,0.2,0.01\n", "line 3, column M11: expected at most M00 = 1 in size, got 1.2"),
         (f"{VIEW}\n0.5236,0.3,1\n", "column theta_i_deg: expected degrees.*radians.*1.5708 rad are 90"),
         (f"{FULL}\n30,10,0,1\n30,10,3.14159,1\n", "line 3, column dphi_deg: expected degrees, got 3.14159"),
         (
@@ -251,3 +254,20 @@ def test_a_failure_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
 def test_an_unknown_format_name_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"format must be one of csv, fred.*got 'astm'"):
         read_goniometer(write(tmp_path, f"{VIEW}\n30,10,1\n"), format="astm")
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        # Noise in the dark of a bright scan, or within the stated errors
+        "30,10,1,0.3,\n30,80,1e-4,-9e-4,\n",
+        "30,10,1,0.3,0.1\n30,80,1,1.3,0.1\n30,82,1,-1,0\n",
+        # Small incidences that one may set
+        "1.0,10,1,0.3,\n1.0,80,1,0.1,\n",
+        "0.5,10,1,0.3,\n",
+    ],
+)
+def test_what_noise_or_choice_explains_is_read(tmp_path, rows):
+    text = "theta_i_deg,theta_view_deg,M00,M10,M10_stderr\n" + rows
+    scan = read_goniometer(write(tmp_path, text))
+    assert scan.sizes["geometry"] == rows.count("\n")
