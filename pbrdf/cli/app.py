@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from pbrdf import __version__
+from pbrdf.cli.dew import dew
 from pbrdf.cli.export import export
 from pbrdf.cli.fit import fit
 from pbrdf.cli.observe import observe
@@ -55,14 +56,7 @@ def _options(
     """Polarised reflectance of real rough surfaces: measured, simulated and fitted."""
 
 
-@app.command(hidden=True)
-def dew() -> None:
-    """Compare drops of several contact angles on a surface; not in this version."""
-    msg = "dew needs water on the surface, which this version does not simulate."
-    raise ValueError(msg)
-
-
-COMMANDS = (pipeline, statistics, fit, simulate, observe, sweep, plot, export)
+COMMANDS = (pipeline, statistics, fit, simulate, observe, sweep, plot, export, dew)
 for function in COMMANDS:
     app.command()(function)
 

@@ -201,7 +201,10 @@ BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
     "sweep out of range": (["sweep", "scene.toml", "--vary", "kappa=-1"], "kappa"),
     "plot of nothing": (["plot", "profile.csv"], "profile.csv"),
     "export to nowhere": (["export", "scene.toml", "-o", "scene.obj"], ".pbsdf"),
-    "dew": (["dew"], "not"),
+    "dew beyond 180 degrees": (["dew", "--contact-angles-deg", "15,200"], "contact_angle"),
+    "dew on what is no scene": (["dew", "--scene", "scan.csv"], "scan.csv"),
+    "dew of an unknown kind": (["dew", "--sizes", "gamma"], "sizes"),
+    "dew without room": (["dew", "--volume-per-area-um", "100"], "room"),
 }
 
 

@@ -1,0 +1,232 @@
+"""What dew does to the polarised reflectance of a surface: section 5 of the paper."""
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from pbrdf.conventions import direction
+from pbrdf.errors import AccuracyWarning
+from pbrdf.optics.materials import Material
+from pbrdf.scene import Scene, Surface
+from pbrdf.simulation import simulate
+from pbrdf.surface import Drops
+
+DRY = "dry"
+# Directions this near to the specular one are its lobe, up to the second angle its skirt;
+# the rest are the wings [rad]
+LOBE, SKIRT = np.deg2rad(10.0), np.deg2rad(30.0)
+REGIONS = ("lobe", "skirt", "wings", "hemisphere")
+# Independent runs from which errors are estimated
+RUNS = 8
+
+Measure = Callable[[np.ndarray], np.ndarray]
+
+
+def compare_dew(  # noqa: PLR0913  (a scene, an amount and a run)
+    surface: Surface,
+    substrate: Material | str,
+    contact_angles: Sequence[float],
+    theta_i: npt.ArrayLike,
+    *,
+    amount: Mapping[str, Any],
+    water: Material | str = "water",
+    runs: int = RUNS,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+    **options: Any,
+) -> xr.Dataset:
+    """Simulate a surface dry and with the same dew at several contact angles.
+
+    Parameters
+    ----------
+    surface, substrate
+        As of a `Scene`.
+    contact_angles : sequence of float
+        Contact angles of the water. [rad]
+    theta_i : array_like, shape (angles,)
+        Zenith angles of the source; its azimuth is averaged over. [rad]
+    amount : mapping
+        What `Drops` takes besides contact angle and material: volume_per_area,
+        number_density, sizes, ...
+    water : Material or str
+        The liquid.
+    runs : int
+        Independent runs; their spread is the standard error.
+    seed : int
+        Makes everything reproducible.
+    progress : callable, optional
+        Called with (runs done, runs in all).
+    **options
+        What `simulate` takes, for each run.
+
+    Returns
+    -------
+    xarray.Dataset
+        `brdf` and `brdf_stderr` (state, theta_i, theta_s, dphi, stokes_out, stokes_in) over
+        all bounces, `albedo`, the energy budget, `coverage` and the coordinate
+        `contact_angle` of each state; NaN for the first, which is dry. `signature` and its
+        errors are those of `signatures`.
+    """
+    angles = [float(angle) for angle in contact_angles]
+    scenes = [Scene(surface, substrate)] + [
+        Scene(surface, substrate, Drops(contact_angle=angle, material=water, **amount))
+        for angle in angles
+    ]
+    states = [DRY] + [f"{np.rad2deg(angle):.4g} deg" for angle in angles]
+    results, notes = [], dict[str, None]()
+    for number, scene in enumerate(scenes):
+        repeats = []
+        for run in range(runs):
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always", AccuracyWarning)
+                # All states of a run share the seed, hence its surfaces
+                common: dict[str, Any] = {"phi_i": "uniform", "seed": seed * runs + run}
+                repeats.append(simulate(scene, np.atleast_1d(theta_i), **common, **options))
+            notes |= {
+                str(one.message): None for one in caught if "realiz" not in str(one.message)
+            }
+            if progress is not None:
+                progress(number * runs + run + 1, len(scenes) * runs)
+        results.append(_over_runs(repeats))
+    for note in notes:
+        warnings.warn(note, AccuracyWarning, stacklevel=2)
+    whole = xr.concat(
+        results, xr.DataArray(states, dims="state", name="state"),
+        combine_attrs="drop_conflicts",
+    )  # fmt: skip
+    whole = whole.assign_coords(contact_angle=("state", [np.nan, *angles]))
+    whole.contact_angle.attrs = {"units": "rad", "long_name": "contact angle of the water"}
+    whole["projected_solid_angle"] = repeats[0].projected_solid_angle
+    whole = whole.merge(signatures(whole), combine_attrs="override")
+    whole["brdf_stderr"] = _stderr(whole.brdf_runs)
+    whole["brdf"] = whole.brdf_runs.mean("run")
+    whole.attrs |= {"warnings": list(notes), "runs": runs, "seed": seed}
+    return whole.drop_vars("brdf_runs")
+
+
+def signatures(result: xr.Dataset) -> xr.Dataset:
+    """Reduce a comparison to numbers: means over parts of the hemisphere.
+
+    Unpolarised light comes in. Each mean is weighted with the projected solid angle.
+
+    Returns
+    -------
+    xarray.Dataset
+        `signature`, `signature_stderr`, and the difference from dry, `added`,
+        `added_stderr`, with dims (state, theta_i, region, quantity). Regions: the lobe
+        within 10 degrees of the specular direction, its skirt up to 30 degrees, the wings
+        beyond, the hemisphere. Quantities: M00, M10, the magnitudes |M20| and of the
+        polarised part P = √(M10² + M20² + M30²) [1/sr], DOLP = ΣP / ΣM00 [1], and the peak
+        over the region of M00 and P [1/sr].
+
+    Notes
+    -----
+    Errors and means are those of the jackknife over runs, which takes away the first order
+    of the bias that magnitudes and peaks of noisy values have.
+    """
+    column = result.brdf_runs.isel(stokes_in=0)
+    axes = ("run", "state", "theta_i", "theta_s", "dphi", "stokes_out")
+    runs = column.transpose(*axes).values
+    weight = result.projected_solid_angle.values
+    regions = _regions(result)
+
+    def measure(mean: np.ndarray) -> np.ndarray:
+        """Quantities (state, theta_i, region, quantity), twice: as they are and added."""
+        values = np.stack(
+            [_quantities(mean, weight, region) for region in regions.swapaxes(0, 1)],
+            axis=-2,
+        )
+        return np.stack([values, values - values[:1]])
+
+    value, stderr = jackknife(runs, measure)
+    dims = ("state", "theta_i", "region", "quantity")
+    names = ("signature", "added")
+    table = {name: (dims, value[k]) for k, name in enumerate(names)}
+    table |= {f"{name}_stderr": (dims, stderr[k]) for k, name in enumerate(names)}
+    coords = {"region": list(REGIONS), "quantity": list(QUANTITIES)}
+    return xr.Dataset(table, coords)
+
+
+QUANTITIES = ("M00", "M10", "|M20|", "P", "DOLP", "peak M00", "peak P")
+
+
+def _quantities(mean: np.ndarray, weight: np.ndarray, region: np.ndarray) -> np.ndarray:
+    """Quantities of one region (theta_i, theta_s, dphi), last axis as QUANTITIES."""
+    share = weight * region
+    share = share / share.sum(axis=(-2, -1), keepdims=True)
+    polarised = np.sqrt(np.sum(mean[..., 1:] ** 2, axis=-1))
+
+    def over(values: np.ndarray) -> np.ndarray:
+        total: np.ndarray = np.sum(values * share, axis=(-2, -1))
+        return total
+
+    def peak(values: np.ndarray) -> np.ndarray:
+        highest: np.ndarray = np.max(np.where(region, values, -np.inf), axis=(-2, -1))
+        return highest
+
+    m00, p = over(mean[..., 0]), over(polarised)
+    degree = np.divide(p, m00, out=np.zeros_like(p), where=m00 > 0.0)
+    return np.stack(
+        [m00, over(mean[..., 1]), over(np.abs(mean[..., 2])), p, degree,
+         peak(mean[..., 0]), peak(polarised)],
+        axis=-1,
+    )  # fmt: skip
+
+
+def jackknife(runs: np.ndarray, measure: Measure) -> tuple[np.ndarray, np.ndarray]:
+    """Value and standard error of any function of the mean over runs (first axis).
+
+    Efron & Stein, Ann. Stat. 9, 586 (1981).
+
+    Examples
+    --------
+    Of the mean itself it is the usual error:
+
+    >>> value, stderr = jackknife(np.array([1.0, 2.0, 4.0]), lambda mean: mean)
+    >>> round(float(value), 4), round(float(stderr), 4)
+    (2.3333, 0.8819)
+    """
+    number = len(runs)
+    total = runs.sum(axis=0)
+    whole = measure(total / number)
+    parts = np.stack([measure((total - run) / (number - 1)) for run in runs])
+    mean = parts.mean(axis=0)
+    spread = np.sqrt((number - 1) / number * np.sum((parts - mean) ** 2, axis=0))
+    return number * whole - (number - 1) * mean, spread
+
+
+def _regions(result: xr.Dataset) -> np.ndarray:
+    """Which bins belong to which region, (theta_i, region, theta_s, dphi)."""
+    theta_s, dphi = np.meshgrid(result.theta_s, result.dphi, indexing="ij")
+    # The source is at azimuth 0, its mirror image at π
+    specular = direction(result.theta_i.values, np.pi)
+    away = np.arccos(np.clip(direction(theta_s, dphi) @ specular.T, -1.0, 1.0))
+    away = np.moveaxis(away, -1, 0)
+    skirt = (away > LOBE) & (away <= SKIRT)
+    return np.stack([away <= LOBE, skirt, away > SKIRT, np.ones_like(skirt)], axis=1)
+
+
+def _over_runs(repeats: Sequence[xr.Dataset]) -> xr.Dataset:
+    """All runs of one state: every BRDF, and the means of the rest."""
+    brdf = xr.concat([one.brdf_total for one in repeats], "run")
+    albedo = xr.concat([one.albedo.sum("bounces") for one in repeats], "run")
+    budget = ("absorbed", "transmitted", "truncated", "leaked")
+    found = xr.Dataset({"brdf_runs": brdf, "albedo": albedo.mean("run")})
+    found["albedo_stderr"] = _stderr(albedo)
+    for name in budget:
+        found[name] = xr.concat([one[name] for one in repeats], "run").mean("run")
+    found.attrs = repeats[0].attrs
+    found.attrs = {
+        key: value
+        for key, value in repeats[0].attrs.items()
+        if key not in ("seed", "rel_error", "warnings")
+    }
+    return found
+
+
+def _stderr(values: xr.DataArray) -> xr.DataArray:
+    return values.std("run", ddof=1) / np.sqrt(values.sizes["run"])
