@@ -49,6 +49,9 @@ ESTIMATORS = {
 # From this half-angle in rms slopes on, a cone is no longer small against the lobe of the
 # surface: the approximations then err by 1 % (studies/two_ways)
 WIDE = 0.5
+# More rays into the hemisphere than this need a decay with the bounces
+SAFE_SAMPLES = 2.0
+SAFE_DECAY = 0.8
 # Narrower cones lose digits [rad]
 NARROW = 1e-4
 
@@ -98,7 +101,7 @@ def observe(  # noqa: PLR0913  (the public signature)
         Paths are cut after so many bounces; what they still carry is `truncated`.
     hemisphere_samples, sample_decay : float
         Rays into the hemisphere above a point of a diffuse base: samples times decay to the
-        power of the bounces before it, rounded at random.
+        power of the bounces before it, rounded at random. They change the noise only.
     estimator : {"facets", "paths", "corners", "count"}
         How light that reaches the source is valued; see Notes.
     start : {"detector", "source"}
@@ -157,7 +160,7 @@ def observe(  # noqa: PLR0913  (the public signature)
     >>> scene = Scene(HeightMap.flat(), Material.mirror())
     >>> seen = observe(scene, 0.5, 0.5, np.pi, n_rays=320, source_half_angle=0.02)
     >>> solid_angle = np.pi * np.sin(0.02) ** 2 * np.cos(0.5)
-    >>> round(float(seen.brdf_total[0, 0, 0]) * solid_angle, 9)
+    >>> float(round(seen.brdf_total[0, 0, 0].item() * solid_angle, 9))
     1.0
     """
     shape, angles = flat_geometry(theta_i, theta_s, dphi, 0.0)
@@ -201,6 +204,7 @@ def observe(  # noqa: PLR0913  (the public signature)
         base=base,
         n_stokes=_stokes_count(stokes),
     )
+    _check_growth(look.hemisphere_samples, look.sample_decay)
     target = None if target_rel_error is None else _target(target_rel_error)
     _check_scene(scene)
     notes = _warnings(scene, np.unique(angles[0]), waves, drawn)
@@ -271,6 +275,17 @@ def _rms_slope(surface: GaussianSurface | MeasuredSurface | HeightMap) -> float:
     """Rms slope per axis of a surface, or of one realisation."""
     sample = surface if isinstance(surface, HeightMap) else surface.sample(0)
     return float(np.sqrt(np.mean([np.mean(slope**2) for slope in sample.slopes()])))
+
+
+def _check_growth(samples: float, decay: float) -> None:
+    """Refuse sampling that sends out more rays at each bounce than find no facet."""
+    if samples > SAFE_SAMPLES and decay > SAFE_DECAY:
+        msg = (
+            f"sample_decay must be at most {SAFE_DECAY:g} with more than {SAFE_SAMPLES:g} "
+            f"hemisphere_samples, got {decay:g} with {samples:g}. Rays would multiply from "
+            "bounce to bounce."
+        )
+        raise ValueError(msg)
 
 
 def _half_angle(name: str, value: float, theta: np.ndarray) -> float:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pbrdf.kernels import observe_paths, shading
-from pbrdf.kernels.observe_paths import Bundle, Rule
+from pbrdf.kernels.observe_paths import FAR_END, Bundle, Rule
 from pbrdf.kernels.observe_record import N_AXES, Catch
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.look import Sums, forward
@@ -87,6 +87,9 @@ def send_bundles(
         # A bundle weighs at most as the smaller of the two cones
         weight = np.minimum(1.0, (np.sin(half_there) / np.sin(half_here)) ** 2)
         sample.one[group] = np.maximum(sample.one[group], (weight * scale)[:, None])
-        sample.energy += catch.energy
+        if kind != FAR_END:
+            # The far end follows only some paths; the others hold all the energy
+            sample.energy += catch.energy
+            sample.valued += look.n_rays
         sample.counts += catch.counts
         sample.bundles += look.n_rays

@@ -90,7 +90,8 @@ class Sight:
     one : ndarray, shape (geometries, bounces)
         Largest M00 that a single path of strength 1 can have added. [1/sr]
     energy : ndarray, shape (wavelengths, N_ENERGIES)
-        Light of the bundles that was cut, lost or left a finite map, a bundle.
+        Light of the bundles that was cut, lost or left a finite map, a bundle; NaN where
+        the facets alone told all and no bundle was sent.
     counts : ndarray of int, shape (N_COUNTS,)
         Fates of the rays of the bundles, as in `pbrdf.kernels.shading`.
     facet_counts : ndarray of int, shape (N_FACET_COUNTS,)
@@ -120,6 +121,7 @@ class Sums:
     counts: np.ndarray = field(init=False)
     facet_counts: np.ndarray = field(init=False)
     bundles: int = 0
+    valued: int = 0  # those of them whose energy is followed
 
     def __post_init__(self) -> None:
         shape = self.look.shape

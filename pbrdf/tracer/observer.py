@@ -25,8 +25,13 @@ def look_at(surface: Field, look: Look, seed: np.random.SeedSequence) -> Sight:
         )
     if look.base.shape[1] > 0 and not counting:
         send_bundles(surface, sample, rng, FAR_END, 1, from_source=not look.from_source)
+    unknown = np.full_like(sample.energy, np.nan)
     return Sight(
-        brdf=sample.brdf, caught=sample.caught, one=sample.one,
-        energy=sample.energy / max(sample.bundles, 1), counts=sample.counts,
-        facet_counts=sample.facet_counts, bundles=sample.bundles,
-    )  # fmt: skip
+        brdf=sample.brdf,
+        caught=sample.caught,
+        one=sample.one,
+        energy=sample.energy / sample.valued if sample.valued > 0 else unknown,
+        counts=sample.counts,
+        facet_counts=sample.facet_counts,
+        bundles=sample.bundles,
+    )

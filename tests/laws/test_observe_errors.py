@@ -19,6 +19,10 @@ FLAT = Scene(HeightMap.flat(), Material(1.5))
         ({"start": "moon"}, "start must be one of detector, source"),
         ({"hemisphere_samples": 0}, "hemisphere_samples must lie in"),
         ({"sample_decay": 1.5}, "sample_decay must lie in"),
+        (
+            {"hemisphere_samples": 9, "sample_decay": 0.9},
+            "sample_decay must be at most 0.8",
+        ),
         ({"max_bounces": 0}, "max_bounces must be a whole number"),
         ({"theta_i": np.zeros((2, 2))}, "must be one-dimensional"),
     ],

@@ -31,9 +31,10 @@ def scores(there, back):
     """Differences in standard errors (bounces, geometry, 4, 4), where paths are many."""
     value = there.brdf.values[:, 0][:, THETA_BIN, DPHI_BIN]
     error = there.brdf_stderr.values[:, 0][:, THETA_BIN, DPHI_BIN]
-    # A polarised element far below M00 has the skewed noise of few paths
+    # Few paths have skewed noise, and so has a polarised element far below M00
     size = np.abs(value) + np.abs(back.brdf.values)
     seen = (back.paths.values > 60)[..., None, None] & (size > 0.02 * value[..., :1, :1])
+    seen &= error[..., :1, :1] < 0.12 * value[..., :1, :1]
     combined = np.hypot(error, back.brdf_stderr.values)[seen]
     return (back.brdf.values - value)[seen] / combined, seen
 

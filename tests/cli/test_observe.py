@@ -1,0 +1,83 @@
+"""`pbrdf observe`: the geometries of a measured scan, simulated into a scan."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from data_io import read_goniometer, read_result
+from pbrdf.cli import main
+
+SCENE = """
+[surface]
+type = "gaussian"
+shape = [32, 32]
+spacing_um = 1.0
+corr_length_um = 6.0
+slope_rms = 0.2
+
+[substrate]
+n = 1.5
+"""
+# One geometry at two wavelengths, and one out of the plane
+SCAN = """theta_i_deg,theta_s_deg,dphi_deg,wavelength_um,M00
+30,30,180,0.5,0.5
+30,30,180,0.6,0.4
+30,10,150,0.5,0.2
+"""
+QUICK = ["--n-rays", "1000", "--realizations", "8"]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "measured.csv").write_text(SCAN)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_scan_is_answered_by_a_scan(folder: Path, capsys: pytest.CaptureFixture) -> None:
+    command = ["observe", "scene.toml", "--scan", "measured.csv", "-o", "simulated.csv"]
+    assert main([*command, *QUICK]) == 0
+    assert "largest M00" in capsys.readouterr().out
+    scan = read_goniometer(folder / "simulated.csv")
+    assert_allclose(np.rad2deg(scan.theta_s), [30.0, 10.0])
+    assert_allclose(np.rad2deg(scan.dphi), [180.0, 150.0])
+    assert (scan.M00 > 0).all()
+    assert (scan.M00_stderr > 0).all()
+    assert scan.M33.values[0] < 0
+    # Nothing is overwritten unasked
+    assert main([*command, *QUICK]) == 2
+
+
+def test_a_dataset_keeps_the_bounces_apart(folder: Path) -> None:
+    angles = ["--theta-i-deg", "20,40", "--theta-view-deg=-10,20"]
+    command = ["observe", "scene.toml", *angles, "-o", "result.nc", *QUICK]
+    assert main([*command, "--stokes", "linear", "--start", "source"]) == 0
+    result = read_result(folder / "result.nc")
+    assert result.sizes["geometry"] == 4
+    assert result.sizes["stokes_out"] == 3
+    assert_allclose(np.rad2deg(result.dphi), [0.0, 180.0, 0.0, 180.0])
+    assert_allclose(result.brdf.sum("bounces"), result.brdf_total, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (["--theta-view-deg", "89.9"], "above the horizon"),
+        (["--theta-view-deg", "steep"], "--theta-view-deg must be numbers"),
+        (["--wavelength-um", "0.5,0.6"], "must be one number for a scan"),
+        (["--estimator", "guess"], "guess"),
+        (["--scan", "missing.csv"], "missing.csv"),
+    ],
+)
+def test_bad_input_is_one_line(
+    folder: Path, capsys: pytest.CaptureFixture, change: list[str], words: str
+) -> None:
+    before = sorted(folder.rglob("*"))
+    assert main(["observe", "scene.toml", *change, *QUICK]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1
+    assert words in lines[0]
+    assert sorted(folder.rglob("*")) == before

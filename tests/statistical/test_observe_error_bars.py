@@ -1,0 +1,119 @@
+"""Are the standard errors of `observe` those of its results, and its knobs free?"""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pbrdf import GaussianSurface, HeightMap, Material, Scene, observe, simulate
+
+SURFACE = GaussianSurface(shape=(64, 64), spacing=1.0, corr_length=5.0, slope_rms=0.35)
+SCAN = {
+    "theta_i": 0.7,
+    "theta_s": np.array([0.7, 0.3, 0.9, 0.5]),
+    "dphi": np.array([np.pi, 2.9, 3.4, 0.4]),
+}
+CONES = {"source_half_angle": 0.04, "detector_half_angle": 0.03}
+
+
+def spread_over_stated(scene, seeds, **options):
+    """Mean square deviation over seeds in stated variances, of M00 by bounces; expected 1.
+
+    With n samples a stated variance, being noisy, divides by (n - 3)/(n - 1) on average.
+    """
+    runs = [observe(scene, **SCAN, **CONES, seed=seed, **options) for seed in seeds]
+    values = np.array([run.brdf.values[:2, :, 0, 0] for run in runs])
+    errors = np.array([run.brdf_stderr.values[:2, :, 0, 0] for run in runs])
+    paths = np.mean([run.paths.values[:2] for run in runs], axis=0)
+    samples = runs[0].realizations if runs[0].ray_batches == 0 else runs[0].ray_batches
+    z2 = ((values - values.mean(axis=0)) / errors) ** 2 * len(runs) / (len(runs) - 1)
+    return z2.mean(axis=0)[paths > 30].mean() * (samples - 3) / (samples - 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("estimator", "albedo"),
+    [("facets", 0.0), ("corners", 0.0), ("paths", 0.4)],
+)
+def test_errors_over_realizations(estimator, albedo):
+    scene = Scene(SURFACE, Material(1.5, diffuse_albedo=albedo))
+    ratio = spread_over_stated(
+        scene, range(40), n_rays=1000, realizations=24, estimator=estimator,
+        start="source", hemisphere_samples=1.0,
+    )  # fmt: skip
+    # Variance of 40 seeds, some of their 8 numbers correlated: a tenth each way
+    assert 0.7 < ratio < 1.35
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("estimator", ["facets", "corners"])
+def test_errors_over_batches_of_a_fixed_surface(estimator):
+    surface = HeightMap(SURFACE.sample(3).heights, 1.0, periodic=True)
+    ratio = spread_over_stated(
+        Scene(surface, Material(1.5)), range(40), n_rays=32_000, estimator=estimator,
+        start="source",
+    )  # fmt: skip
+    assert 0.7 < ratio < 1.35
+
+
+@pytest.mark.parametrize(
+    "knobs",
+    [
+        {"hemisphere_samples": 6.0, "sample_decay": 0.5},
+        {"hemisphere_samples": 1.0, "sample_decay": 0.2},
+    ],
+)
+def test_sampling_of_the_hemisphere_changes_the_noise_only(knobs):
+    """Against counting, which asks neither source nor facets, in all classes of bounces."""
+    scene = Scene(SURFACE, Material(1.5, diffuse_albedo=0.8))
+    cones = {"source_half_angle": 0.15, "detector_half_angle": 0.1}
+    options = {"n_rays": 2000, "realizations": 32, "start": "source"}
+    clever = observe(scene, **SCAN, **cones, **options, seed=1, **knobs)
+    plain = observe(
+        scene, **SCAN, **cones, **options, seed=2, estimator="count",
+        hemisphere_samples=1.0, sample_decay=1.0,
+    )  # fmt: skip
+    difference = (clever.brdf - plain.brdf).values[..., 0, 0]
+    z = difference / np.hypot(clever.brdf_stderr, plain.brdf_stderr).values[..., 0, 0]
+    assert np.abs(z).max() < 4
+    # Light of three bounces is there, and known to some per cent
+    assert (clever.brdf_stderr[2, :, 0, 0] < 0.2 * clever.brdf[2, :, 0, 0]).all()
+
+
+def test_a_wide_cone_is_called_wide():
+    options = {"n_rays": 320, "realizations": 8, "max_bounces": 1}
+    with pytest.warns(UserWarning, match="wide beside the rms slope"):
+        observe(
+            Scene(SURFACE, Material(1.5)), 0.7, 0.7, np.pi, source_half_angle=0.2, **options
+        )
+
+
+def test_cut_light_is_counted_as_by_the_other_way():
+    surface = HeightMap(SURFACE.sample(3).heights, 1.0, periodic=True)
+    scene = Scene(surface, Material.mirror())
+    options = {"n_rays": 400_000, "phi_i": "uniform", "max_bounces": 2}
+    there = simulate(scene, 0.7, **options, seed=1)
+    back = observe(
+        scene, **SCAN, **CONES, **options, seed=2, start="source", estimator="corners"
+    )
+    # Some 3000 rays each
+    assert 0.005 < there.truncated.item() < 0.02
+    assert_allclose(back.truncated.item(), there.truncated.item(), rtol=0.09)
+    assert back.leaked.item() == 0.0
+
+
+def test_what_was_not_followed_is_not_called_zero():
+    """Facets alone tell the single bounces; how much light went on is then unknown."""
+    seen = observe(
+        Scene(SURFACE, Material(1.5)), **SCAN, **CONES, n_rays=320, realizations=8,
+        max_bounces=1,
+    )  # fmt: skip
+    assert seen.bundles == 0
+    assert np.isnan(seen.truncated.item())
+
+
+def test_a_reading_without_a_path_has_the_error_of_one():
+    """Far from the specular direction of a gentle surface no facet joins the cones."""
+    gentle = GaussianSurface(shape=(32, 32), spacing=1.0, corr_length=8.0, slope_rms=0.02)
+    seen = observe(Scene(gentle, Material(1.5)), 0.7, 0.2, 0.0, n_rays=320, realizations=8)
+    assert seen.brdf_total[0, 0, 0].item() == 0.0
+    assert 0.0 < seen.brdf_total_stderr[0, 0, 0].item() < np.inf
