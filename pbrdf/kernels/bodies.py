@@ -75,27 +75,39 @@ def slab_interval(a, b, c, d_x, d_y, d_z, k_x, k_y, k_z, t_low, t_high):
     return max(t_low, second), t_high
 
 
-@jit(allocates=False)
-def body_interval(bodies, k, d_x, d_y, d_z, k_x, k_y, k_z):
-    """Distances at which a line enters and leaves body k, or MISSED.
+@jit(forceinline=True)
+def heights_in_cylinder(radius, d_x, d_y, d_z, k_x, k_y, k_z):
+    """Lowest and highest point of the part of a line within a radius of the axis."""
+    square = k_x * k_x + k_y * k_y
+    if square < FLAT:
+        return (-FAR, FAR) if d_x * d_x + d_y * d_y <= radius * radius else MISSED
+    t_mid = -(d_x * k_x + d_y * k_y) / square
+    x = d_x + k_x * t_mid
+    y = d_y + k_y * t_mid
+    depth = radius * radius - x * x - y * y
+    if depth < 0.0:
+        return MISSED
+    climb = abs(k_z) * math.sqrt(depth / square)
+    middle = d_z + k_z * t_mid
+    return middle - climb, middle + climb
 
-    (d_x, d_y, d_z) is the start relative to the axis and the reference height.
-    """
+
+@jit(allocates=False)
+def stack_interval(bodies, k, d_x, d_y, d_z, k_x, k_y, k_z):
+    """`body_interval` of a body of several slabs."""
     slabs = bodies.slabs
-    first = bodies.slab_start[k]
-    stop = bodies.slab_start[k + 1]
+    wide = bodies.radius[k] * (1.0 + CLOSE)
+    lowest, highest = heights_in_cylinder(wide, d_x, d_y, d_z, k_x, k_y, k_z)
     t_in, t_out = MISSED
-    for index in range(first, stop):
-        # One closed quadric needs no clipping
+    for index in range(bodies.slab_start[k], bodies.slab_start[k + 1]):
+        low = slabs[index, LOW]
+        high = slabs[index, HIGH]
+        if high < lowest or low > highest:
+            continue
         t_low, t_high = -FAR, FAR
-        if stop - first > 1:
-            low = slabs[index, LOW]
-            high = slabs[index, HIGH]
-            if k_z != 0.0:
-                t_low = min((low - d_z) / k_z, (high - d_z) / k_z)
-                t_high = max((low - d_z) / k_z, (high - d_z) / k_z)
-            elif d_z < low or d_z > high:
-                continue
+        if k_z != 0.0:
+            t_low = min((low - d_z) / k_z, (high - d_z) / k_z)
+            t_high = max((low - d_z) / k_z, (high - d_z) / k_z)
         t_low, t_high = slab_interval(
             slabs[index, CONSTANT], slabs[index, LINEAR], slabs[index, SQUARE],
             d_x, d_y, d_z, k_x, k_y, k_z, t_low, t_high,
@@ -105,6 +117,23 @@ def body_interval(bodies, k, d_x, d_y, d_z, k_x, k_y, k_z):
             t_in = min(t_in, t_low)
             t_out = max(t_out, t_high)
     return t_in, t_out
+
+
+@jit(forceinline=True)
+def body_interval(bodies, k, d_x, d_y, d_z, k_x, k_y, k_z):
+    """Distances at which a line enters and leaves body k, or MISSED.
+
+    (d_x, d_y, d_z) is the start relative to the axis and the reference height.
+    """
+    first = bodies.slab_start[k]
+    if bodies.slab_start[k + 1] - first > 1:
+        return stack_interval(bodies, k, d_x, d_y, d_z, k_x, k_y, k_z)
+    # One closed quadric needs no clipping
+    slabs = bodies.slabs
+    return slab_interval(
+        slabs[first, CONSTANT], slabs[first, LINEAR], slabs[first, SQUARE],
+        d_x, d_y, d_z, k_x, k_y, k_z, -FAR, FAR,
+    )  # fmt: skip
 
 
 @jit(allocates=False)

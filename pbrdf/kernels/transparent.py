@@ -95,13 +95,13 @@ from pbrdf.kernels.shading import (
 )
 from pbrdf.kernels.transport import exit_turn
 
-MAX_STEPS = 10_000_000
-MAX_SEGMENTS = 1_000_000  # of one ray with all its parts
+MAX_STEPS = 10_000_000  # of a walk, and of one ray with all its parts
 # Both parts of a beam are followed while the weaker has this share of the ray; a part below
 # the second share goes on by chance only
 SPLIT = 0.01
 WEAK = 1e-3
 
+CROWDED = -9
 NO_FILM, CONFORMAL, LEVEL = 0, 1, 2
 # What comes next: a facet of the ground or of the film, from above or from below; the
 # surface of a body, from outside or inside; or the end of the path
@@ -358,13 +358,13 @@ def cross(world, state, top, kind, hit):
 def meet_interface(world, w, state, top, kind, hit, columns, draw):
     """Reflect and refract at the surface of a transparent body; returns the new top.
 
-    Within one medium nothing happens. A negative top says that the list was full.
+    Within one medium nothing happens. CROWDED says that the beam is in too many bodies.
     """
     media = world.media
     before = medium_of(world, state, top)
     copy_beam(state, top, top + 1)
     if not cross(world, state, top + 1, kind, hit):
-        return -1
+        return CROWDED
     after = medium_of(world, state, top + 1)
     ratio = media.n[w, after] / media.n[w, before]
     n_x, n_y, n_z = normal_at(world, state, top, kind, hit)
@@ -515,59 +515,79 @@ def launch_beam(state, x, y, z, source, cos_phi, sin_phi, columns):
         state[0, MUELLER + 5 * row] = 1.0
 
 
+@jit(forceinline=True)
+def absorb_on_the_way(world, w, state, top, columns, distance, energy):
+    """Weaken the beam by the medium it has crossed, Beer and Lambert."""
+    absorption = world.media.absorption[w, medium_of(world, state, top)]
+    if absorption > 0.0:
+        arriving = state[top, MUELLER]
+        scale_columns(state, top, columns, math.exp(-absorption * distance))
+        energy[w, ABSORBED] += arriving - state[top, MUELLER]
+
+
+@jit(forceinline=True)
+def survives(state, top, columns, draw):
+    """Whether a beam goes on; a weak one by chance, at the strength of the threshold."""
+    strength = state[top, MUELLER]
+    if strength >= WEAK:
+        return True
+    if draw * WEAK >= strength:
+        return False
+    scale_columns(state, top, columns, WEAK / strength)
+    return True
+
+
+@jit(forceinline=True)
+def follow_beam(
+    world, w, top, stream, number, step, cos_phi, sin_phi, max_events, columns, room, tally
+):  # fmt: skip
+    """Take the beam at the top of the stack to its next event; returns the new top."""
+    state, hit = room.state, room.hit
+    kind = next_event(world, state, top, hit)
+    if kind < OUT:
+        absorb_on_the_way(world, w, state, top, columns, hit[HIT_T], tally.energy)
+    if kind >= OUT or state[top, EVENTS] >= max_events:
+        end_beam(state, top, kind, columns, w, cos_phi, sin_phi, tally)
+        return top - 1
+
+    move_beam(world, state, top, kind, hit)
+    draw_a, draw_b = uniform_pair(stream, number, 2 * step)
+    opaque = kind == GROUND
+    if kind == BODY_IN:
+        opaque = world.media.solid[w, world.bodies.medium[int(hit[HIT_BODY])]] >= 0
+    if opaque:
+        new = meet_solid(
+            world, w, state, top, kind, hit, columns, draw_a, draw_b, tally.energy
+        )
+    else:
+        new = meet_interface(world, w, state, top, kind, hit, columns, draw_a)
+        if new == CROWDED:
+            end_beam(state, top, ASTRAY, columns, w, cos_phi, sin_phi, tally)
+            return top - 1
+    if new >= 0:
+        _, chance = uniform_pair(stream, number, 2 * step + 1)
+        if not survives(state, new, columns, chance):
+            return new - 1
+    return new
+
+
 @jit(allocates=False)
 def trace_beams(
     world, w, number, source, cos_phi, sin_phi, max_events, columns, room, tally
 ):  # fmt: skip
     """Follow one ray and all its parts until their light has left or is lost."""
-    state, hit = room.state, room.hit
     top = 0
-    draws = 0
-    segments = 0
+    step = 0
     while top >= 0:
-        segments += 1
-        kind = next_event(world, state, top, hit)
-        ends = kind >= OUT or segments > MAX_SEGMENTS
-        if not ends:
-            absorption = world.media.absorption[w, medium_of(world, state, top)]
-            if absorption > 0.0:
-                arriving = state[top, MUELLER]
-                scale_columns(state, top, columns, math.exp(-absorption * hit[HIT_T]))
-                tally.energy[w, ABSORBED] += arriving - state[top, MUELLER]
-            ends = state[top, EVENTS] >= max_events
-        if ends:
-            if segments > MAX_SEGMENTS:
-                kind = ASTRAY
-            end_beam(state, top, kind, columns, w, cos_phi, sin_phi, tally)
-            top -= 1
-            continue
-
-        move_beam(world, state, top, kind, hit)
-        draw_a, draw_b = uniform_pair(source.stream, number, draws)
-        draws += 1
-        opaque = kind == GROUND
-        if kind == BODY_IN:
-            opaque = world.media.solid[w, world.bodies.medium[int(hit[HIT_BODY])]] >= 0
-        if opaque:
-            top = meet_solid(
-                world, w, state, top, kind, hit, columns, draw_a, draw_b, tally.energy
-            )
-        else:
-            met = meet_interface(world, w, state, top, kind, hit, columns, draw_a)
-            if met < 0:
-                end_beam(state, top, ASTRAY, columns, w, cos_phi, sin_phi, tally)
-                top -= 1
-            else:
-                top = met
-        # A weak part goes on by chance, at the strength of the threshold
-        if top >= 0 and state[top, MUELLER] < WEAK:
-            _, chance = uniform_pair(source.stream, number, draws)
-            draws += 1
-            if chance * WEAK >= state[top, MUELLER]:
-                top -= 1
-            else:
-                scale_columns(state, top, columns, WEAK / state[top, MUELLER])
-    tally.counts[N_SEGMENTS] += segments
+        top = follow_beam(
+            world, w, top, source.stream, number, step, cos_phi, sin_phi, max_events,
+            columns, room, tally,
+        )  # fmt: skip
+        step += 1
+        if step == MAX_STEPS and top >= 0:
+            end_beam(room.state, top, ASTRAY, columns, w, cos_phi, sin_phi, tally)
+            break
+    tally.counts[N_SEGMENTS] += step
 
 
 @jit(allocates=False)

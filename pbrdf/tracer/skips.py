@@ -47,11 +47,13 @@ def explanation(plan: Plan, *, periodic: bool, steepest: float) -> list[str]:
     steepest : float
         Largest slope of a facet of one sample of the surface. [1]
     """
-    if "walk" in plan.skips:
+    if plan.media is not None:
+        lines = _about_contaminants(plan, steepest)
+    elif "walk" in plan.skips:
         lines = _about_the_walk(plan.skips, periodic, steepest)
     else:
         lines = ["Nothing skipped: Embree traces every ray."]
-    if plan.base.shape[1] == 0:
+    if plan.base.shape[1] == 0 and plan.media is None:
         lines.append("Diffuse base: none, so no path is split; nothing is transmitted.")
     if plan.max_bounces < 3:
         lines.append(
@@ -61,13 +63,30 @@ def explanation(plan: Plan, *, periodic: bool, steepest: float) -> list[str]:
         lines.append("V: not computed in or out (it is followed inside paths).")
     if plan.n_stokes == 1:
         lines.append("All but M00: not computed (paths stay polarised inside).")
-    if len(plan.n) > 1:
+    if len(plan.n) > 1 and plan.media is None:
         lines.append(f"Tracing for {len(plan.n) - 1} of {len(plan.n)} wavelengths: shared.")
-    if plan.spectrum is not None:
+    if plan.spectrum is not None and plan.media is None:
         lines.append(
             "Single bounces: summed by bin, and shaded once a bin and wavelength, to "
             f"{TOLERANCE:g} of M00."
         )
+    return lines
+
+
+def _about_contaminants(plan: Plan, steepest: float) -> list[str]:
+    assert plan.media is not None
+    lines = [
+        "Embree: not built; bodies are met exactly, by a grid, and the ground by a walk.",
+        "Parts of a split ray below a hundredth of it: one of the two is followed, by "
+        "chance; below a thousandth, by chance or not at all.",
+    ]
+    if "steep" in plan.skips:
+        lines.append(
+            "The ground, for rays rising above its steepest facet in the first sample, a "
+            f"slope of {steepest:.3g}: not searched."
+        )
+    if not plan.media.absorption.any():
+        lines.append("Absorption on the way: none in any medium, not computed.")
     return lines
 
 
