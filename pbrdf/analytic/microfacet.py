@@ -164,6 +164,7 @@ class MicrofacetModel:
         wavelength: npt.ArrayLike | None = None,
         *,
         phi_i: npt.ArrayLike = 0.0,
+        out: np.ndarray | None = None,
     ) -> np.ndarray:
         """Mueller BRDF in the frames of the conventions page; arguments broadcast.
 
@@ -177,6 +178,9 @@ class MicrofacetModel:
             Vacuum wavelength, needed by tabulated materials. [um]
         phi_i : array_like
             Azimuth of the source from the x axis of an anisotropic surface. [rad]
+        out : ndarray, shape (..., 4, 4), optional
+            Written into and returned. A large array that is used again spares the time in
+            which the system would clear a new one. [1/sr]
 
         Returns
         -------
@@ -186,35 +190,37 @@ class MicrofacetModel:
         Raises
         ------
         ValueError
-            If an angle leaves its range (degrees?), or the wavelength the material's.
+            If an angle leaves its range (degrees?), or the wavelength the material's, or if
+            `out` does not fit.
         """
         n, kappa = self.material.indices(wavelength)
         shape, columns = flat_geometry(theta_i, theta_s, dphi, phi_i, n, kappa)
+        matrices = _writable(out, (*shape, 4, 4))
         if isinstance(self.slope_distribution, SlopeTable):
-            return self._tabulated(self.slope_distribution, columns).reshape(*shape, 4, 4)
-        size = columns[0].size
+            self._fill_tabulated(self.slope_distribution, columns, matrices.reshape(-1))
+            return matrices
         # The kernel reads n and kappa with one stride
         if columns[4].size != columns[5].size:
+            size = columns[0].size
             columns[4:] = [np.broadcast_to(c, size).copy() for c in columns[4:]]
-        out = np.empty((size, 4, 4))
-        _fill(columns, self.surface(), out)
-        return out.reshape(*shape, 4, 4)
+        _fill(columns, self.surface(), matrices.reshape(-1))
+        return matrices
 
-    def _tabulated(self, table: SlopeTable, columns: list[np.ndarray]) -> np.ndarray:
-        """Matrices over measured slopes: the table gives densities and Lambda."""
+    def _fill_tabulated(
+        self, table: SlopeTable, columns: list[np.ndarray], out: np.ndarray
+    ) -> None:
+        """Fill in matrices over measured slopes: the table gives densities and Lambda."""
         size = columns[0].size
         theta_i, theta_s, dphi, phi_i, n, kappa = (
             np.broadcast_to(c, size).copy() for c in columns
         )
         slopes = np.empty((2, size))
         kernel.fill_facet_slopes(theta_i, theta_s, dphi, phi_i, slopes)
-        out = np.empty((size, 4, 4))
         kernel.fill_tabulated(
             theta_i, theta_s, dphi, n, kappa, table.density_at(*slopes),
             table.overhang(theta_i, phi_i), table.overhang(theta_s, phi_i + dphi),
             self.surface(), out,
         )  # fmt: skip
-        return out
 
     def roughness(self) -> Roughness:
         """Slope law as the kernels take it; of a table, the Gaussian of its rms."""
@@ -248,9 +254,23 @@ class MicrofacetModel:
         )
 
 
+def _writable(out: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
+    """Check the array to write into, or make one."""
+    if out is None:
+        return np.empty(shape)
+    if out.shape != shape or out.dtype != np.float64 or not out.flags.carray:
+        order = "contiguous" if out.flags.c_contiguous else "not contiguous"
+        msg = (
+            f"out must be a contiguous, writable float64 array of shape {shape}, "
+            f"got {out.dtype} of shape {out.shape}, {order}. Leave it out to get a new one."
+        )
+        raise ValueError(msg)
+    return out
+
+
 def _fill(columns: list[np.ndarray], surface: kernel.Surface, out: np.ndarray) -> None:
     """Run the kernel over chunks, on as many threads as pay."""
-    size = len(out)
+    size = columns[0].size
     if size <= CHUNK:
         kernel.fill_brdf(*columns, surface, out)
         return
@@ -258,7 +278,7 @@ def _fill(columns: list[np.ndarray], surface: kernel.Surface, out: np.ndarray) -
     def fill_part(start: int) -> None:
         part = slice(start, start + CHUNK)
         pieces = [c[part] if c.size > 1 else c for c in columns]
-        kernel.fill_brdf(*pieces, surface, out[part])
+        kernel.fill_brdf(*pieces, surface, out[16 * start : 16 * (start + CHUNK)])
 
     workers = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
     with ThreadPoolExecutor(workers) as pool:

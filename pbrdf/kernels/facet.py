@@ -13,9 +13,10 @@ incidence and grazing, where sines and cosines enter as themselves.
 """
 
 from collections import namedtuple
-from math import cos, sin, sqrt
+from math import sqrt
 
 from . import jit
+from .elementary import cos, sin
 from .fresnel import select
 
 __all__ = [
@@ -38,7 +39,7 @@ Directions = namedtuple(
 Facet = namedtuple("Facet", "slope_x slope_y tan2_tilt cos_beta sin2_beta")
 
 
-@jit
+@jit(forceinline=True)
 def directions(theta_i, theta_s, dphi, cos_phi, sin_phi):
     """Sines and cosines of the zeniths, d = (theta_i - theta_s)/2 and h = dphi/2."""
     sin_d = sin(0.5 * (theta_i - theta_s))
@@ -56,7 +57,7 @@ def directions(theta_i, theta_s, dphi, cos_phi, sin_phi):
     )
 
 
-@jit
+@jit(forceinline=True)
 def mirror_facet(way):
     """Slopes, squared tangent of the tilt and local incidence of the mirroring facet.
 
@@ -79,7 +80,7 @@ def mirror_facet(way):
     return Facet(slope_x, slope_y, tan2_tilt, cos_beta, sin2_beta)
 
 
-@jit
+@jit(forceinline=True)
 def double_angle(cosine, sine, cos_limit, sin_limit):
     """Double angle of the direction (cosine, sine) of any length; a limit if it is zero."""
     norm = cosine * cosine + sine * sine
@@ -90,7 +91,7 @@ def double_angle(cosine, sine, cos_limit, sin_limit):
     return select(defined, cos_2a, cos_limit), select(defined, sin_2a, sin_limit)
 
 
-@jit
+@jit(forceinline=True)
 def frame_rotations(way):
     """Double angles, as cos and sin, from the incident frame and from the scattered frame.
 
@@ -116,7 +117,7 @@ def frame_rotations(way):
     return cos_2i, sin_2i, cos_2s, sin_2s
 
 
-@jit
+@jit(forceinline=True)
 def rotated_elements(way, a, b, c, d):
     """Rows of F' = R(-alpha_s) F(beta) R(alpha_i), equation (16)."""
     cos_2i, sin_2i, cos_2s, sin_2s = frame_rotations(way)

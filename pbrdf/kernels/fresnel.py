@@ -34,13 +34,13 @@ __all__ = [
 TINY = 1e-300
 
 
-@jit
+@jit(forceinline=True)
 def select(condition, value, otherwise):
     """`value` where the condition holds, else `otherwise`."""
     return value if condition else otherwise
 
 
-@jit
+@jit(forceinline=True)
 def wave_normal(cos_beta, n, kappa):
     """Real and imaginary part of q = sqrt(N^2 - sin^2 beta), both >= 0.
 
@@ -56,7 +56,7 @@ def wave_normal(cos_beta, n, kappa):
     return select(real >= 0.0, larger, smaller), select(real >= 0.0, smaller, larger)
 
 
-@jit
+@jit(forceinline=True)
 def elements_from_wave(cos_beta, sin2_beta, excess_re, excess_im, q_re, q_im):
     """Elements A, B, C, D from q and N^2 - 1 = excess_re + i excess_im."""
     forward = cos_beta + q_re
@@ -76,7 +76,7 @@ def elements_from_wave(cos_beta, sin2_beta, excess_re, excess_im, q_re, q_im):
     )
 
 
-@jit
+@jit(forceinline=True)
 def facet_elements(cos_beta, sin2_beta, n, kappa):
     """Elements A, B, C, D without a branch, from cos and sin^2 each to full accuracy."""
     perfect = n == inf

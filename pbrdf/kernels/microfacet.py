@@ -1,14 +1,20 @@
 """The Mueller BRDF of a rough surface made of Fresnel facets, equation (20)."""
 
 from collections import namedtuple
-from math import cos, sin
 
 from . import jit
+from .elementary import cos, sin
 from .facet import directions, mirror_facet, rotated_elements
 from .fresnel import facet_elements
-from .shadowing import TORRANCE_SPARROW, combined_overhangs, shadowing_factor
-from .slopes import slope_density
-from .volume import added_elements, base_radiance
+from .shadowing import (
+    SMITH_CORRELATED,
+    TORRANCE_SPARROW,
+    Shadowing,
+    combined_overhangs,
+    shadowing_factor,
+)
+from .slopes import GAUSSIAN, Roughness, slope_density
+from .volume import Diffuse, added_elements, base_radiance
 
 __all__ = [
     "Surface",
@@ -22,7 +28,7 @@ __all__ = [
 Surface = namedtuple("Surface", "rough shadow specular_gain diffuse")
 
 
-@jit
+@jit(forceinline=True)
 def facet_density(way, facet, rough):
     """Lit facet area that mirrors one direction to the other: P / (4 cos_i cos_s). [1/sr]
 
@@ -58,24 +64,71 @@ def microfacet_brdf(way, n, kappa, surface, radiance):
     return brdf_rows(way, facet, strength, n, kappa, surface.diffuse, radiance)
 
 
+@jit(forceinline=True)
+def write_rows(rows, k, out):
+    """Write the rows of matrix k.
+
+    Into a flat array, at distances that the compiler knows: only then does it see that no
+    two geometries share an element, and computes several at once.
+    """
+    first, second, third, fourth = rows
+    m = 16 * k
+    out[m], out[m + 1], out[m + 2], out[m + 3] = first
+    out[m + 4], out[m + 5], out[m + 6], out[m + 7] = second
+    out[m + 8], out[m + 9], out[m + 10], out[m + 11] = third
+    out[m + 12], out[m + 13], out[m + 14], out[m + 15] = fourth
+
+
+@jit(forceinline=True)
+def is_usual(surface):
+    """Whether `usual_surface` says the same as the surface."""
+    return (
+        surface.rough.law == GAUSSIAN
+        and surface.rough.isotropic
+        and surface.shadow.rule == SMITH_CORRELATED
+        and not surface.diffuse.has_more
+    )
+
+
+@jit(forceinline=True)
+def usual_surface(surface):
+    """Name the default forms by constants, so that compiling removes all other branches."""
+    slope = surface.rough.slope_x
+    return Surface(
+        Roughness(GAUSSIAN, slope, slope, True, 1.0),
+        Shadowing(SMITH_CORRELATED, 0.0, 0.0),
+        surface.specular_gain,
+        Diffuse(surface.diffuse.diffuse_albedo, 0.0, 0, 0.0, 0, 0.0, False),
+    )
+
+
+@jit(forceinline=True)
+def fill_alike(theta_i, theta_s, dphi, phi_i, n, kappa, surface, out):
+    """Fill the matrices of one source azimuth and one index."""
+    cos_phi, sin_phi = cos(phi_i), sin(phi_i)
+    radiance = base_radiance(n, kappa, surface.diffuse)
+    for k in range(theta_i.size):
+        way = directions(theta_i[k], theta_s[k], dphi[k], cos_phi, sin_phi)
+        write_rows(microfacet_brdf(way, n, kappa, surface, radiance), k, out)
+
+
 @jit
 def fill_brdf(theta_i, theta_s, dphi, phi_i, n, kappa, surface, out):
-    """Fill out[k] with the matrix of geometry k; arrays of length 1 hold for all."""
+    """Fill out[16 k:] with the matrix of geometry k; arrays of length 1 hold for all."""
+    if phi_i.size == 1 and n.size == 1:
+        if is_usual(surface):
+            surface = usual_surface(surface)
+            fill_alike(theta_i, theta_s, dphi, phi_i[0], n[0], kappa[0], surface, out)
+        else:
+            fill_alike(theta_i, theta_s, dphi, phi_i[0], n[0], kappa[0], surface, out)
+        return
     each_phi = 1 if phi_i.size > 1 else 0
     each_index = 1 if n.size > 1 else 0
-    cos_phi, sin_phi = cos(phi_i[0]), sin(phi_i[0])
-    radiance = base_radiance(n[0], kappa[0], surface.diffuse)
     for k in range(theta_i.size):
-        if each_phi:
-            cos_phi, sin_phi = cos(phi_i[k]), sin(phi_i[k])
-        way = directions(theta_i[k], theta_s[k], dphi[k], cos_phi, sin_phi)
-        m = k * each_index
-        if each_index:
-            radiance = base_radiance(n[m], kappa[m], surface.diffuse)
-        rows = microfacet_brdf(way, n[m], kappa[m], surface, radiance)
-        for i in range(4):
-            for j in range(4):
-                out[k, i, j] = rows[i][j]
+        phi, m = phi_i[k * each_phi], k * each_index
+        way = directions(theta_i[k], theta_s[k], dphi[k], cos(phi), sin(phi))
+        radiance = base_radiance(n[m], kappa[m], surface.diffuse)
+        write_rows(microfacet_brdf(way, n[m], kappa[m], surface, radiance), k, out)
 
 
 @jit
@@ -92,7 +145,7 @@ def fill_facet_slopes(theta_i, theta_s, dphi, phi_i, out):
 def fill_tabulated(
     theta_i, theta_s, dphi, n, kappa, density, lambda_i, lambda_s, surface, out
 ):
-    """Fill out[k] as `fill_brdf`, with slope density and both Smith's Lambda given."""
+    """Fill out[16 k:] as `fill_brdf`, with slope density and both Smith's Lambda given."""
     for k in range(theta_i.size):
         way = directions(theta_i[k], theta_s[k], dphi[k], 1.0, 0.0)
         facet = mirror_facet(way)
@@ -106,6 +159,4 @@ def fill_tabulated(
         radiance = base_radiance(n[k], kappa[k], surface.diffuse)
         strength = surface.specular_gain * lit * seen
         rows = brdf_rows(way, facet, strength, n[k], kappa[k], surface.diffuse, radiance)
-        for i in range(4):
-            for j in range(4):
-                out[k, i, j] = rows[i][j]
+        write_rows(rows, k, out)

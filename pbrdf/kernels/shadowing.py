@@ -1,11 +1,12 @@
 """Shadowing and masking factors, from 0 (hidden) to 1."""
 
 from collections import namedtuple
-from math import atan2, erf, exp, sqrt
+from math import atan2, sqrt
 
 from . import jit
+from .elementary import erf, exp
 from .fresnel import TINY, select
-from .slopes import mean_overhang, slope_along
+from .slopes import mean_overhang, slope_along, steepness
 
 __all__ = [
     "MAXWELL_BEARD",
@@ -55,8 +56,7 @@ def torrance_sparrow(way, facet):
 @jit
 def facing_up(cos_theta, sin_theta, slope):
     """Numerator 1 - erfc(nu)/2 of Smith 1967: the part of the facets turned to the ray."""
-    nu = cos_theta / ((sin_theta + 1e-30) * sqrt(2.0) * slope)
-    return 0.5 * (1.0 + erf(nu))
+    return 0.5 * (1.0 + erf(steepness(cos_theta, sin_theta, slope)))
 
 
 @jit
@@ -69,7 +69,7 @@ def direction_weight(way):
     return 4.41 * azimuth / (4.41 * azimuth + 1.0)
 
 
-@jit
+@jit(forceinline=True)
 def combined_overhangs(rule, way, lambda_i, lambda_s):
     """Statistical factor of both Lambda, without Smith's numerator of 1967."""
     if rule == SMITH_CORRELATED:

@@ -6,11 +6,12 @@ density of equation (17) is f / cos^4(tilt).
 """
 
 from collections import namedtuple
-from math import atan2, erf, exp, log, pi, sqrt
+from math import atan2, log, pi, sqrt
 
 import numpy as np
 
 from . import jit
+from .elementary import erf, exp
 from .fresnel import TINY, select
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "slope_along",
     "slope_density",
     "slope_norm",
+    "steepness",
 ]
 
 GAUSSIAN, MODIFIED_GAUSSIAN, MODIFIED_CAUCHY, EXPONENTIAL, TROWBRIDGE_REITZ = range(5)
@@ -76,7 +78,7 @@ def slope_norm(law, slope_x, slope_y):
     return 1.0 + 0.0 * variance
 
 
-@jit
+@jit(forceinline=True)
 def radial_density(rough, r2):
     """Density f(r^2) of the stretched slope, per unit slope area."""
     variance = rough.slope_x * rough.slope_y
@@ -94,7 +96,7 @@ def radial_density(rough, r2):
     return width2 / (pi * (width2 + r2) * (width2 + r2))
 
 
-@jit
+@jit(forceinline=True)
 def slope_density(rough, facet):
     """Probability density of the facet's slopes, per unit slope area."""
     if rough.isotropic:
@@ -104,7 +106,7 @@ def slope_density(rough, facet):
     return radial_density(rough, r2)
 
 
-@jit
+@jit(forceinline=True)
 def slope_along(rough, cos_phi, sin_phi):
     """Scale of the slopes along an azimuth."""
     if rough.isotropic:
@@ -129,6 +131,12 @@ def overhang_integral(rough, cot):
 
 
 @jit(forceinline=True)
+def steepness(cos_theta, sin_theta, slope):
+    """Smith's nu = cot(theta) / (sqrt(2) slope) of a ray over Gaussian slopes."""
+    return cos_theta / (sqrt(2.0) * slope * sin_theta + 1e-30)
+
+
+@jit(forceinline=True)
 def mean_overhang(rough, cos_theta, sin_theta, slope):
     """Smith's Lambda = <max(z' - cot theta, 0)> / cot theta for slopes z' along the ray.
 
@@ -136,7 +144,7 @@ def mean_overhang(rough, cos_theta, sin_theta, slope):
     et al., Microfacet models for refraction (2007), Trowbridge-Reitz.
     """
     if rough.law == GAUSSIAN:
-        nu = cos_theta / (sqrt(2.0) * slope * sin_theta + 1e-30)
+        nu = steepness(cos_theta, sin_theta, slope)
         return 0.5 * (exp(-nu * nu) / (nu * SQRT_PI) + erf(nu) - 1.0)
     cot = cos_theta / (sin_theta + 1e-30)
     if rough.law == TROWBRIDGE_REITZ:

@@ -88,7 +88,7 @@ def volume_elements(way, n, kappa, diffuse, radiance):
     )
 
 
-@jit
+@jit(forceinline=True)
 def added_elements(way, n, kappa, diffuse, radiance):
     """Sum of (22) and (23), added to the elements 00, 01, 10, 11 and to 22 and 33. [1/sr]
 

@@ -151,3 +151,33 @@ def test_diffuse_term_and_gain_are_the_papers():
 def test_bad_values_are_named(call, message):
     with pytest.raises(ValueError, match=message):
         call(MicrofacetModel(Material(1.5), 0.2))
+
+
+def test_the_usual_model_and_the_general_kernel_agree():
+    """The default forms have a loop of their own; an index for each geometry has not."""
+    rng = np.random.default_rng(5)
+    angles = (*rng.uniform(0, np.pi / 2, (2, 500)), rng.uniform(-6, 6, 500))
+    model = MicrofacetModel(Material(1.37, 0.4), 0.27, diffuse_albedo=0.1)
+    rows = Material.from_table(wavelength=[0.4, 0.8], n=[1.37, 1.37], kappa=[0.4, 0.4])
+    general = MicrofacetModel(rows, 0.27, diffuse_albedo=0.1)
+    expected = general.brdf(*angles, wavelength=np.full(500, 0.5))
+    scale = expected[:, :1, :1]
+    assert_allclose(model.brdf(*angles) / scale, expected / scale, rtol=0, atol=1e-13)
+
+
+def test_writes_into_a_given_array():
+    model = MicrofacetModel(Material(1.5), 0.3)
+    theta = np.linspace(0.1, 1.2, 20_000)
+    out = np.full((20_000, 4, 4), np.nan)
+    assert model.brdf(theta, 0.5, 3.0, out=out) is out
+    np.testing.assert_array_equal(out, model.brdf(theta, 0.5, 3.0))
+
+
+@pytest.mark.parametrize(
+    "out",
+    [np.empty((3, 4)), np.empty((3, 4, 4), np.float32), np.empty((4, 4, 3)).T],
+    ids=["shape", "type", "order"],
+)
+def test_refuses_an_array_that_does_not_fit(out):
+    with pytest.raises(ValueError, match="out must be a contiguous, writable float64"):
+        MicrofacetModel(Material(1.5), 0.3).brdf([0.1, 0.2, 0.3], 0.5, 3.0, out=out)
