@@ -237,6 +237,10 @@ class Objective:
         cost = float(value)
         return (cost if np.isfinite(cost) else np.inf), gradient.full().ravel()
 
+    def hessian(self, x: np.ndarray) -> np.ndarray:
+        """Return the exact Hessian of the cost at x, shape (n, n)."""
+        return np.asarray(self.expressions.hessian(x, self.numbers).full())
+
     def predict(self, x: np.ndarray) -> np.ndarray:
         """Return the predicted curve at x, shape (m,)."""
         return self.prediction.function(x).full().ravel()
