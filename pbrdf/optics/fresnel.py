@@ -5,6 +5,7 @@ import numpy.typing as npt
 
 from pbrdf.errors import require
 from pbrdf.kernels.fresnel import fill_amplitudes, fill_reflection, fill_transmission
+from pbrdf.optics.checks import checked_kappa, checked_n
 
 __all__ = ["fresnel_amplitudes", "specular_mueller", "transmission_mueller"]
 
@@ -129,14 +130,7 @@ def _interface(
         "cos_beta", cos_beta, lambda v: (v >= 0) & (v <= 1), "lie in [0, 1] [1]",
         "It is the cosine of the incidence angle.",
     )  # fmt: skip
-    index = require(
-        "n", n, lambda v: (v > 0) & ((v <= 1e70) | np.isinf(v)), "be > 0 [1]",
-        "A perfect mirror is n = inf.",
-    )  # fmt: skip
-    absorption = require(
-        "kappa", kappa, lambda v: (v >= 0) & (v <= 1e70), "be >= 0 [1]",
-        "The index is n + i kappa; kappa >= 0 absorbs.",
-    )  # fmt: skip
+    index, absorption = checked_n(n), checked_kappa(kappa)
     outside = require(
         "n_incident", n_incident, lambda v: (v > 0) & np.isfinite(v),
         "be finite and > 0 [1]", "",

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pbrdf.errors import require
+from pbrdf.optics.checks import checked_kappa, checked_n
 from pbrdf.optics.dispersion import Dispersion, Table
 
 __all__ = ["Material"]
@@ -51,17 +52,9 @@ class Material:
 
     def __post_init__(self) -> None:
         if not callable(self.n):
-            n = require(
-                "n", self.n, lambda v: (v > 0) & ((v <= 1e70) | np.isinf(v)),
-                "be > 0 and at most 1e70, or inf [1]", "A perfect mirror is n = inf.",
-            )  # fmt: skip
-            object.__setattr__(self, "n", _scalar("n", n))
+            object.__setattr__(self, "n", _scalar("n", checked_n(self.n)))
         if not callable(self.kappa):
-            kappa = require(
-                "kappa", self.kappa, lambda v: (v >= 0) & (v <= 1e70), "be >= 0 [1]",
-                "The index is n + i kappa; kappa >= 0 absorbs.",
-            )  # fmt: skip
-            object.__setattr__(self, "kappa", _scalar("kappa", kappa))
+            object.__setattr__(self, "kappa", _scalar("kappa", checked_kappa(self.kappa)))
         albedo = require(
             "diffuse_albedo", self.diffuse_albedo, lambda v: (v >= 0) & (v <= 1),
             "lie in [0, 1] [1]", "It is a fraction of the light.",
