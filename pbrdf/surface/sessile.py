@@ -18,30 +18,22 @@ LARGEST_APEX = 1e6
 # The profile is followed to this angle at most; beyond it is horizontal
 STEEPEST = np.pi - 1e-3
 
-# Gravity matters above this Bond number (heights change by a third of it) ...
+# Above this Bond number heights change by more than about a third of a per cent
 BOND = 0.01
-# ... or, above 90 degrees, where it widens the contact circle by more than this share
-WIDENING = 0.1
 _NO_POINTS = np.empty((0, N_POINT))
 
 
 def bond_number(volume: float, capillary_length: float) -> float:
-    """Bo = (R / l)², with the radius R of the sphere of this volume. [1]"""
-    return float(np.cbrt(3 * volume / (4 * np.pi)) / capillary_length) ** 2
+    """Bo = (R / l)², with the radius R of the sphere of this volume. [1]
 
+    Examples
+    --------
+    Water drops of a quarter of a millimetre are still caps:
 
-def gravity_matters(volume: float, contact_angle: float, capillary_length: float) -> bool:
-    """Whether gravity changes a drop visibly.
-
-    A drop that barely touches rests on a contact circle of radius √(2/3) R²/l, which may
-    exceed R sin θ long before the drop itself is flattened (Mahadevan & Pomeau 1999).
+    >>> round(bond_number(4 / 3 * np.pi * 250.0**3, 2725.7), 4)
+    0.0084
     """
-    bond = bond_number(volume, capillary_length)
-    if bond > BOND:
-        return True
-    return contact_angle > np.pi / 2 and bool(
-        np.sqrt(2 / 3 * bond) > WIDENING * max(np.sin(contact_angle), 1e-2)
-    )
+    return float(np.cbrt(3 * volume / (4 * np.pi)) / capillary_length) ** 2
 
 
 def flattened(volume: float, contact_angle: float, capillary_length: float) -> Shape:
@@ -215,7 +207,7 @@ class ShapeMaker:
         if volume not in self._known:
             heavy = self._gravity is True or (
                 self._gravity == "auto"
-                and gravity_matters(volume, self.contact_angle, self._capillary_length)
+                and bond_number(volume, self._capillary_length) > BOND
             )
             self._known[volume] = (
                 flattened(volume, self.contact_angle, self._capillary_length)

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from pbrdf.kernels.sessile import trace_profile
-from pbrdf.surface.sessile import flattened, gravity_matters
+from pbrdf.surface.sessile import ShapeMaker, flattened
 from pbrdf.surface.shapes import cap, cap_radius, cap_volume, contact_depth, sphere
 
 LENGTH = 2725.7  # capillary length of water
@@ -175,14 +175,21 @@ def test_the_plane_carries_the_weight_of_a_drop(degrees, sphere_radius):
     assert_allclose(pressure - pull, weight, rtol=0, atol=1e-5 * (pressure + weight))
 
 
-def test_puddles_are_refused_and_gravity_is_judged_by_bond_number_and_contact():
+def test_puddles_are_refused():
     with pytest.raises(ValueError, match=r"volume must be that of a drop .* Lay a Film"):
         flattened(1e14, np.deg2rad(60.0), LENGTH)
-    small, large = 4 / 3 * np.pi * 50.0**3, 4 / 3 * np.pi * 500.0**3
-    assert not gravity_matters(small, np.deg2rad(90.0), LENGTH)
-    assert gravity_matters(large, np.deg2rad(90.0), LENGTH)
-    # A drop of 179 degrees rests on what gravity presses down
-    assert gravity_matters(small, np.deg2rad(179.0), LENGTH)
+
+
+def test_gravity_is_taken_where_the_bond_number_asks_for_it():
+    def slabs(sphere_radius, gravity):
+        maker = ShapeMaker(np.deg2rad(150.0), gravity, LENGTH)
+        return len(maker.shape(4 / 3 * np.pi * sphere_radius**3).slabs)
+
+    # Bo = 0.0084 and 0.0121
+    assert slabs(250.0, "auto") == 1
+    assert slabs(300.0, "auto") > 1
+    assert slabs(300.0, False) == 1
+    assert slabs(20.0, True) > 1
 
 
 def test_bodies_touch_where_their_radii_meet_at_one_height():
