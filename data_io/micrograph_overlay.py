@@ -1,14 +1,40 @@
-"""What a person looks at in a picture: its edges drawn in, and the scale bar."""
+"""What a person looks at: the picture with its edges drawn in."""
 
 from pathlib import Path
 
 import numpy as np
-from scipy import ndimage
 
-from data_io.micrograph_levels import find_annotation_band
-from pbrdf.errors import DataFileError
+from data_io.micrograph_levels import load_grey
+from data_io.micrograph_profile import EdgeProfile
 
 GOOD, POOR, OVERHANG = np.array([[0.1, 0.9, 0.2], [1.0, 0.1, 0.1], [1.0, 0.2, 1.0]])
+
+
+def write_profile_overlay(
+    overlay_path: str | Path, path: str | Path, profiles: list[EdgeProfile]
+) -> None:
+    """Write the picture as PNG with its edges drawn in, to check by eye.
+
+    Green where the quality is good, red where it is poor, magenta where the edge overhangs.
+
+    Parameters
+    ----------
+    overlay_path : str or Path
+        The PNG to write.
+    path : str or Path
+        The picture that was read.
+    profiles : list of EdgeProfile
+        What `read_profile_images` made of it.
+    """
+    from skimage import io
+
+    grey, _ = load_grey(path)
+    picture = np.repeat(grey[..., None], 3, axis=-1)
+    for profile in profiles:
+        at = np.linspace(0, profile.size - 1, len(profile.pixels)).round().astype(int)
+        draw_edge(picture, profile.pixels, profile.quality[at], profile.overhang[at])
+    image = (picture * 255).round().astype(np.uint8)
+    io.imsave(Path(overlay_path), image, check_contrast=False)
 
 
 def draw_edge(
@@ -34,49 +60,3 @@ def draw_edge(
     for shift in np.ndindex(thickness, thickness):
         row, column = (pixels + np.array(shift) - thickness // 2).round().astype(int).T
         picture[row.clip(0, rows - 1), column.clip(0, columns - 1)] = colour
-
-
-def find_scale_bar(path: str | Path, grey: np.ndarray) -> float:
-    """Return the length of the scale bar: the longest thin straight bar of full contrast.
-
-    Parameters
-    ----------
-    path : str or Path
-        The picture's file, for messages.
-    grey : ndarray, shape (rows, columns)
-        Grey levels in [0, 1].
-
-    Returns
-    -------
-    float
-        Distance of the bar's ends. [pixels]
-
-    Raises
-    ------
-    DataFileError
-        If there is no such bar.
-    """
-    rows, columns = grey.shape
-    top, bottom = find_annotation_band(grey)
-    # With a text band the bar is in it; else anywhere
-    band = grey[bottom:] if bottom < rows else grey[:top] if top > 0 else grey
-    best = 0
-    for mark in (band > 0.85, band < 0.15):
-        labels, _ = ndimage.label(mark, structure=[[0, 0, 0], [1, 1, 1], [0, 0, 0]])
-        for box in ndimage.find_objects(labels):
-            length = box[1].stop - box[1].start
-            if not 0.04 * columns < length < 0.8 * columns or length <= best:
-                continue
-            row = box[0].start
-            # A bar is thin: a few rows above and below are ground again in most columns
-            reach = max(6, rows // 60)
-            above, below = row - reach, row + reach
-            if above < 0 or below >= band.shape[0]:
-                continue
-            middle = mark[:, box[1]]
-            if middle[above].mean() < 0.2 and middle[below].mean() < 0.2:
-                best = length
-    if best == 0:
-        problem = "expected a scale bar, found no thin horizontal bar in black or white"
-        raise DataFileError(path, problem, "Give um_per_pixel= instead.")
-    return float(best)

@@ -1,0 +1,65 @@
+"""Whether a picture shows an edge at all: clear refusals of everything else."""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from data_io.micrograph_edges import Trace
+from data_io.micrograph_levels import Levels, flatten
+from data_io.micrograph_profile import MIN_QUALITY
+from pbrdf.errors import DataFileError
+
+# A picture that two grey levels explain to less than this shows something else than an edge
+MIN_EXPLAINED = 0.6
+# An edge with more unclear columns, or with more overhanging ones, is no graph z(x)
+MAX_UNCLEAR, MAX_OVERHANG = 0.3, 0.1
+# Beyond this angle the columns cut the surface too obliquely. [rad]
+MAX_TILT = np.deg2rad(25)
+
+
+def two_levels(path: str | Path, grey: np.ndarray) -> Levels:
+    """Flatten, or say why the picture cannot be."""
+    levels = flatten(grey)
+    cure = "Give a picture of the sample's edge, seen from the side, on contrasting ground."
+    if levels is None:
+        problem = (
+            "expected a bright and a dark phase with an edge between, found no two levels"
+        )
+        raise DataFileError(path, problem, cure)
+    if levels.contrast < 0.02:
+        problem = f"expected a contrast of at least 2 % of white, got {levels.contrast:.1%}"
+        raise DataFileError(path, problem, "Stretch or retake the picture.")
+    return levels
+
+
+def refuse_other_pictures(path: str | Path, levels: Levels, cleaned: np.ndarray) -> None:
+    """Raise unless two levels parted by long edges explain the picture."""
+    smooth = gaussian_filter(levels.phase, 3.0)
+    model = gaussian_filter(cleaned.astype(float), 3.0)
+    variance = float(np.var(smooth))
+    explained = (
+        1 - float(np.mean((smooth - model) ** 2)) / variance if variance > 0 else 0.0
+    )
+    if explained < MIN_EXPLAINED:
+        problem = (
+            f"expected two phases parted by an edge, but they explain only "
+            f"{max(explained, 0):.0%} of the picture's contrast"
+        )
+        cure = "Give a side view of an edge, or crop to it (crop=)."
+        raise DataFileError(path, problem, cure)
+
+
+def fault_of(trace: Trace) -> str | None:
+    """Say why a border of two phases is no edge to take a profile from, or None."""
+    unclear = float(np.mean(trace.quality < MIN_QUALITY))
+    if unclear > MAX_UNCLEAR:
+        return f"found one of which {unclear:.0%} is unlike a blurred step"
+    overhang = float(trace.overhang.mean())
+    if overhang > MAX_OVERHANG:
+        return f"found one that overhangs along {overhang:.0%} of its length"
+    tilt = np.arctan(np.polyfit(trace.columns, trace.height, 1)[0])
+    if abs(tilt) > MAX_TILT:
+        degrees = np.rad2deg(abs(tilt))
+        return f"found one turned by {degrees:.0f} degrees: turn the picture first"
+    return None
