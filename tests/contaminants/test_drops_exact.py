@@ -13,7 +13,7 @@ from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.beams import KX, KY, KZ, N_STATE
 from pbrdf.kernels.interfaces import refract_beam
 from tests.contaminants.scenes import assert_closed, assert_within, clean_counters
-from tests.reference_optics import fresnel
+from tests.reference_optics import fresnel, path_mueller
 
 WATER = Material(1.333)
 REFERENCE = Path(__file__).parents[1] / "reference"
@@ -121,6 +121,34 @@ def test_c09_mirror_sphere_on_black_ground(theta_deg):
     assert_within(flux[..., 0], error[..., 0], share)
     assert_within(flux[..., 1:3], error[..., 1:3], 0.0)
     clean_counters(result)
+
+
+def test_c09_all_elements_of_the_outside_of_a_sphere():
+    """Single reflections out of the plane of incidence, averaged over the bin."""
+    theta, radius = np.deg2rad(30.0), 0.2
+    sphere = Spheres.at([[0.5, 0.5, radius]], radius=radius, material=WATER)
+    result = simulate(
+        Scene(PLANE, Material.black(), sphere), theta, n_rays=2_000_000, n_theta=9,
+        n_dphi=12,
+    )  # fmt: skip
+    theta_s, dphi, _ = detector_bins(9, 12)
+    lit = (0.75 - 2 * radius * np.tan(theta)) * 0.75 * np.cos(theta)
+    k_i = np.array([np.sin(theta), 0.0, np.cos(theta)])
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    one = {"theta_i": 0, "bounces": 0}
+    brdf = (result.brdf * result.projected_solid_angle).isel(one).values
+    error = (result.brdf_stderr * result.projected_solid_angle).isel(one).values
+    for i, j in [(2, 1), (4, 4), (5, 7), (3, 9), (6, 6)]:
+        expected = np.zeros((4, 4))
+        for a, wa in zip(nodes, weights, strict=True):
+            for b, wb in zip(nodes, weights, strict=True):
+                t, p = theta_s[i] + a * np.pi / 36, dphi[j] + b * np.pi / 12
+                k_s = np.array([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
+                half = (k_i + k_s) / np.linalg.norm(k_i + k_s)
+                matrix, _ = path_mueller(k_i, [half], 1.333)
+                expected += wa * wb / 4 * matrix * np.sin(t) * np.pi / 18 * np.pi / 6
+        expected *= radius**2 / 4 / lit
+        assert_within(brdf[i, j], error[i, j], expected, extra=2e-4 * expected[0, 0])
 
 
 @pytest.mark.parametrize("theta_deg", [0.0, 41.4])
