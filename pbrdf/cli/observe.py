@@ -72,7 +72,9 @@ def observe(
     n_rays: options.Rays = 20_000,
     realizations: options.Realizations = 32,
     target: options.Target = None,
-    max_bounces: options.Bounces = 64,
+    max_bounces: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Where paths are cut.")
+    ] = 64,
     hemisphere_samples: Annotated[
         float,
         typer.Option(min=0.1, max=1e4, help="Rays above a point of a diffuse base."),

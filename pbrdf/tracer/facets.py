@@ -7,8 +7,9 @@ from pbrdf.kernels.observe_facets import Cones
 from pbrdf.tracer.field import GUARD_HEIGHTS, GUARD_SHARE, Field
 from pbrdf.tracer.look import Look, Sums, forward
 
-# Source azimuths a sample at which the facets of an isotropic surface are asked
-AZIMUTHS = 32
+# Source azimuths a sample at which the facets of an isotropic surface are asked: as many as
+# bring every facet of the right tilt into sight, within these bounds
+FEWEST_AZIMUTHS, MOST_AZIMUTHS = 8, 64
 # Facets a cell of the table of slopes, on average, and the most cells an axis
 FACETS_PER_CELL = 8
 MOST_CELLS = 2048
@@ -30,24 +31,21 @@ def ask_facets(surface: Field, sample: Sums, rng: np.random.Generator) -> None:
     bounds = observe_facets.slope_range(terrain, inside)
     table = observe_facets.sort_facets(terrain, inside, size, *bounds)
 
-    azimuths = np.array([look.phi_i or 0.0])
-    if look.phi_i is None:
-        steps = np.arange(AZIMUTHS) + rng.random()
-        azimuths = steps * (2.0 * np.pi / AZIMUTHS)
-    points = max(1, -(-look.n_rays // (int(facets) * len(azimuths))))
-    streams = rng.integers(2**63, size=(look.size, len(azimuths)), dtype=np.uint64)
     paths = look.estimator == "paths"
     means = np.empty(0) if paths else mean_matrices(look)
     room = np.empty((4, 4))
     omega_i, omega_s = look.solid_angles()
     for g in range(look.size):
+        azimuths = _azimuths(look, g, rng.random())
+        streams = rng.integers(2**63, size=len(azimuths), dtype=np.uint64)
+        points = max(1, -(-look.n_rays // (int(facets) * len(azimuths))))
         shown = np.zeros((look.n.shape[1], observe_facets.N_SHOWN))
         matrices = np.zeros((len(look.n) if paths else 0, look.n_stokes, look.n_stokes))
         counts = np.zeros(observe_facets.N_FACET_COUNTS, dtype=np.int64)
         for a, phi_i in enumerate(azimuths):
             observe_facets.show_facets(
                 terrain, table, size, inside, _cones(look, g, phi_i), points,
-                streams[g, a], look.optics, shown, matrices, counts, room,
+                streams[a], look.optics, shown, matrices, counts, room,
             )  # fmt: skip
         # Points of unknown visibility are taken to be as bright as the others
         known = 1.0
@@ -84,6 +82,24 @@ def _interior(surface: Field) -> np.ndarray:
     low = np.ceil(guard).astype(np.int64)
     low = np.minimum(low, (sides - 1) // 2)
     return np.array([low[0], sides[0] - low[0], low[1], sides[1] - low[1]])
+
+
+def _azimuths(look: Look, g: int, shift: float) -> np.ndarray:
+    """Azimuths of the source at which to ask the facets for one geometry. [rad]
+
+    On the circle of slopes of the right steepness a direction covers about the mean of the
+    two half-angles to each side.
+    """
+    if look.phi_i is not None:
+        return np.array([look.phi_i])
+    theta_i, theta_s, dphi = look.theta_i[g], look.theta_s[g], look.dphi[g]
+    across = np.hypot(
+        np.sin(theta_i) + np.sin(theta_s) * np.cos(dphi), np.sin(theta_s) * np.sin(dphi)
+    )
+    slope = across / (np.cos(theta_i) + np.cos(theta_s))
+    wanted = np.ceil(2.0 * np.pi * slope / (look.source + look.detector))
+    count = int(np.clip(wanted, FEWEST_AZIMUTHS, MOST_AZIMUTHS))
+    return (np.arange(count) + shift) * (2.0 * np.pi / count)
 
 
 def _cones(look: Look, g: int, phi_i: float) -> Cones:
