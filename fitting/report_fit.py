@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from scipy import stats
@@ -64,6 +65,8 @@ def result_of(
     values = dict(zip(labels, solution.x.tolist(), strict=True))
     stderr = dict(zip(labels, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     models = _models(problem, solution.x)
+    remarks = (getattr(model, "remarks", ()) for model in models.values())
+    warnings += dict.fromkeys(chain.from_iterable(remarks))
     return FitResult(
         values=values,
         stderr=stderr,

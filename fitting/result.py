@@ -29,7 +29,8 @@ class FitResult:
     values, stderr : mapping of str to float
         Best values and standard errors by parameter name; a parameter that is separate for
         each scan appears as `name[scan]`. The standard error is inf where the data do not
-        determine the parameter and nan where there is no minimum.
+        determine the parameter and nan where there is no minimum. Of a kappa at 0 it is the
+        root of the standard error of its square, which is all that the data see.
     covariance, correlation : ndarray, shape (n, n)
         In the order of `values`, uncertainty of fixed parameters included.
     residuals : ndarray, shape (m,)
@@ -59,8 +60,8 @@ class FitResult:
     n_estimated : int
         Parameters of the noise that were estimated beside the free ones.
     stderr_parts : mapping of str to mapping
-        Standard error of each parameter by source: "noise" and each uncertain fixed
-        parameter.
+        Standard error of each parameter by source: "noise", "simulation" where there is
+        one in the model, and each uncertain fixed parameter.
     problem : Problem
         What was solved, to be solved again with changes.
     """

@@ -10,7 +10,6 @@ it, the correction stays.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,8 +17,15 @@ import numpy as np
 from fitting.analytic_model import AnalyticModel
 from fitting.index_grid import IndexGrid, Range
 from fitting.observations import Geometry
-from fitting.simulated_trace import Trace, group_count, trace
-from pbrdf import HeightMap, Material, MicrofacetModel, Scene
+from fitting.simulated_run import (
+    Run,
+    facet_slope,
+    middle_index,
+    opaque_material,
+    range_around,
+)
+from fitting.simulated_trace import group_count
+from pbrdf import MicrofacetModel, Scene
 
 if TYPE_CHECKING:
     import casadi
@@ -27,47 +33,8 @@ if TYPE_CHECKING:
 
 __all__ = ["SimulatedModel"]
 
-# Up to this kappa a material is taken for a dielectric
-_WEAK = 1.0
-_DIELECTRIC: tuple[Range, Range] = ((1.15, 2.6), (0.0, 1.5))
-
-Key = tuple[float, float | None]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Run:
-    """How to trace, and what has been traced: shared by all models of one surface."""
-
-    scene: Scene
-    grid: IndexGrid
-    index: tuple[float, float]
-    companion: MicrofacetModel
-    options: Mapping[str, Any]
-    traces: dict[Key, Trace] = field(default_factory=dict)
-    datasets: "dict[Key, xr.Dataset]" = field(default_factory=dict)
-
-    def key(self, theta_i: float, phi_i: float) -> Key:
-        isotropic = getattr(self.scene.surface, "isotropic", False)
-        return round(theta_i, 9), None if isotropic else round(phi_i, 9)
-
-    def of(self, keys: Sequence[Key]) -> list[Trace]:
-        """Return the traces of these source directions; run what is missing."""
-        missing = [key for key in dict.fromkeys(keys) if key not in self.traces]
-        for phi_i in dict.fromkeys(phi_i for _, phi_i in missing):
-            here = [key for key in missing if key[1] == phi_i]
-            traces, dataset = trace(
-                self.scene,
-                [theta_i for theta_i, _ in here],
-                self.grid,
-                index=self.index,
-                companion=self.companion,
-                phi_i=phi_i,
-                **self.options,
-            )
-            for position, (key, found) in enumerate(zip(here, traces, strict=True)):
-                self.traces[key] = found
-                self.datasets[key] = dataset.isel(theta_i=[position])
-        return [self.traces[key] for key in keys]
+# Part of the traced slope by which the analytical curve may carry the simulation along
+_FAR = 0.1
 
 
 class SimulatedModel:
@@ -123,11 +90,11 @@ class SimulatedModel:
         stokes: str = "full",
         progress: Callable[[int, int], None] | None = None,
     ) -> None:
-        material = _opaque(scene)
+        material = opaque_material(scene)
         if model is None:
-            model = MicrofacetModel(material, slope_rms=_slope(scene))
-        index = _index(model.material)
-        grid = IndexGrid(*(index_range or _range_around(index)))
+            model = MicrofacetModel(material, slope_rms=facet_slope(scene))
+        index = middle_index(model.material)
+        grid = IndexGrid(*(index_range or range_around(index)))
         for name, value, (low, high) in zip(
             ("n", "kappa"), index, (grid.n, grid.kappa), strict=True
         ):
@@ -138,7 +105,7 @@ class SimulatedModel:
                 )
                 raise ValueError(msg)
         companion = model.with_parameters(
-            slope_rms=_slope(scene),
+            slope_rms=facet_slope(scene),
             specular_gain=1.0,
             diffuse_albedo=0.0,
             volume_albedo=0.0,
@@ -156,7 +123,7 @@ class SimulatedModel:
             "progress": progress,
         }
         self.model = model
-        self._run = _Run(
+        self._run = Run(
             scene=scene, grid=grid, index=index, companion=companion, options=options
         )
         self._group: int | None = None
@@ -198,6 +165,20 @@ class SimulatedModel:
     def updated(self, values: Mapping[str, float]) -> "SimulatedModel":
         """Return the model with these values, on the same paths."""
         return self._with(model=AnalyticModel(self.model).updated(values))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the present values ask of the simulation that it does not give."""
+        traced, now = (
+            float(np.sqrt(np.mean(np.square(model.slope_rms))))
+            for model in (self._run.companion, self.model)
+        )
+        if abs(now / traced - 1.0) <= _FAR:
+            return ()
+        return (
+            f"the surface was traced with slope_rms {traced:.3g}, far from {now:.3g}: "
+            "light of several bounces is that of the former; trace one of the latter",
+        )
 
     # What a user asks for
 
@@ -250,7 +231,7 @@ class SimulatedModel:
         """Return the Mueller BRDF, shape (N, 4, 4)."""
         where = geometry.theta_i, geometry.theta_s, geometry.dphi
         ratio, multiple = self._read(geometry)
-        n, kappa = _index(self.model.material)
+        n, kappa = middle_index(self.model.material)
         gain = self.model.specular_gain
         bare = self.model.with_parameters(
             specular_gain=1.0, diffuse_albedo=0.0, volume_albedo=0.0, grazing_albedo=0.0
@@ -287,56 +268,3 @@ def _flat(*directions: np.ndarray | float) -> tuple[Geometry, tuple[int, ...]]:
     unknown = np.full(theta_i.size, np.nan)
     angles = theta_i.ravel(), theta_s.ravel(), dphi.ravel(), phi_i.ravel()
     return Geometry(*angles, unknown), theta_i.shape
-
-
-def _opaque(scene: Scene) -> Material:
-    """Return the material of a scene whose paths do not depend on its index."""
-    if not isinstance(scene, Scene):
-        msg = (
-            f"scene must be a Scene, got {type(scene).__name__}. Use Scene(surface, index)."
-        )
-        raise TypeError(msg)
-    material = scene.materials[0]
-    reason = ""
-    if len(scene.materials) > 1:
-        reason = "several materials"
-    elif scene.contaminants:
-        reason = "contaminants"
-    elif material.diffuse_albedo > 0.0:
-        reason = "a diffuse base under the interface"
-    if reason:
-        msg = (
-            f"scene must be a clean opaque surface of one material, got {reason}. Diffuse "
-            "light can be fitted as diffuse_albedo or volume_albedo."
-        )
-        raise ValueError(msg)
-    return material
-
-
-def _slope(scene: Scene) -> float | tuple[float, float]:
-    """Return the rms slope of the facets, one number where the surface is isotropic."""
-    surface = scene.surface
-    if isinstance(surface, HeightMap):
-        x, y = (float(np.sqrt(np.mean(slope**2))) for slope in surface.slopes())
-    else:
-        x, y = surface.facet_slope_rms
-    if min(x, y) <= 0.0:
-        msg = "scene must have a rough surface to be fitted, got a flat one."
-        raise ValueError(msg)
-    return x if getattr(surface, "isotropic", False) else (x, y)
-
-
-def _index(material: Material) -> tuple[float, float]:
-    """Return the index, of a tabulated material that in the middle of its range."""
-    if not material.dispersive:
-        return material.index()
-    return material.index(0.5 * sum(material.valid_range))
-
-
-def _range_around(index: tuple[float, float]) -> tuple[Range, Range]:
-    """Return the indices to be ready for."""
-    n, kappa = index
-    (low, high), absorbing = _DIELECTRIC
-    if kappa <= _WEAK:
-        return (min(low, n), max(high, n)), absorbing
-    return (0.4 * n, 2.5 * n), (0.5 * kappa, 1.7 * kappa)

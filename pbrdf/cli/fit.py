@@ -95,6 +95,7 @@ def fit(
             model = _simulated(
                 scene,
                 measured.values(),
+                options.names(free),
                 n_rays=n_rays,
                 realizations=realizations,
                 seed=seed,
@@ -133,16 +134,21 @@ def _analytic(
 
 
 def _simulated(
-    scene: Path, scans: "Iterable[xr.Dataset]", **options: Any
+    scene: Path, scans: "Iterable[xr.Dataset]", free: tuple[str, ...], **options: Any
 ) -> "SimulatedModel":
-    """Return the simulated surface to start from; V is traced where it was measured."""
+    """Return the simulated surface to start from, ready for what is read and varied."""
     import pbrdf
     from fitting import SimulatedModel
 
     names = {str(name) for scan in scans for name in scan.data_vars}
     circular = any(name[0] == "M" and "3" in name[1:3] for name in names)
+    loaded = pbrdf.load_scene(scene)
+    material, held = loaded.materials[0], None
+    if not {"n", "kappa"} & set(free) and not material.dispersive:
+        n, kappa = material.index()
+        held = ((n, n), (kappa, kappa))
     stokes = "full" if circular else "linear"
-    return SimulatedModel(pbrdf.load_scene(scene), stokes=stokes, **options)
+    return SimulatedModel(loaded, index_range=held, stokes=stokes, **options)
 
 
 def _slope(
