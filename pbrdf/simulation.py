@@ -15,7 +15,7 @@ from pbrdf.errors import AccuracyWarning, require
 from pbrdf.kernels.shading import base_strength
 from pbrdf.results import to_dataset
 from pbrdf.scene import Scene
-from pbrdf.surface import HeightMap
+from pbrdf.surface import GaussianSurface, HeightMap
 from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.plan import Moments, Plan, Tally
@@ -31,6 +31,8 @@ BATCHES = 32
 FEW_REALIZATIONS = 8
 # Where paths are cut: on a clean surface, and where transparent bodies may catch light
 MOST_BOUNCES, MOST_EVENTS = 64, 1024
+# Half-angle of the widest source [rad]
+WIDEST_SOURCE = 0.5
 # Where a run towards a target error gives up
 MAX_SAMPLES = 4096
 
@@ -53,6 +55,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
     progress: Callable[[int, int], None] | None = None,
     skips: bool | Iterable[str] = True,
     explain: bool = False,
+    source_half_angle: float = 0.0,
+    fold: bool = False,
 ) -> xr.Dataset:
     """Trace light from the source to the hemisphere and bin it as Mueller BRDF.
 
@@ -93,6 +97,14 @@ def simulate(  # noqa: PLR0913  (the public signature)
         Embree. The same rays are traced in any case.
     explain : bool
         Say in the attribute `explanation` what was left out and why.
+    source_half_angle : float
+        Half-angle of the source, a disc of uniform radiance about (theta_i, phi_i): its
+        directions carry equal parts of the flux through the mean surface. dphi and the
+        Stokes frame stay those of its axis, the frame carried along great circles. [rad]
+    fold : bool
+        Average every sample with its mirror image in the plane of incidence, which halves
+        the variance. For surfaces that are their own mirror image in the mean only: an
+        isotropic GaussianSurface on a square grid with phi_i="uniform".
 
     Returns
     -------
@@ -162,6 +174,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
         n_dphi=_even("n_dphi", n_dphi),
         skips=allowed,
         media=media,
+        half_angle=_half_angle(source_half_angle, angles, clean=media is None),
+        fold=_mirrored(fold, scene, phi_i),
     )
     target = None if target_rel_error is None else _target(target_rel_error)
     _check_scene(scene)
@@ -170,17 +184,20 @@ def simulate(  # noqa: PLR0913  (the public signature)
         warnings.warn(note, AccuracyWarning, stacklevel=2)
 
     root = np.random.SeedSequence(seed)
+    # Tallies to use again: to make a large one costs more than to clear it
+    spare: deque[Tally] = deque()
     if batched:
         # The surface, or the one realisation asked for, stays the same in all batches
         first = root.spawn(1)[0] if _varies(scene) else root
-        draw = partial(_trace_fixed, _realize(scene, plan, first), plan)
+        draw = partial(_trace_fixed, _realize(scene, plan, first), plan, spare)
     else:
-        draw = partial(_trace_realization, scene, plan)
+        draw = partial(_trace_realization, scene, plan, spare)
 
     moments = Moments(plan)
     limit = samples if target is None else max(samples, MAX_SAMPLES)
     for tally in _in_order(draw, root, limit, _workers(workers)):
         moments.add(tally)
+        spare.append(tally.emptied())
         if progress is not None:
             progress(moments.samples, samples if target is None else limit)
         enough = moments.samples >= max(samples, 2)
@@ -202,6 +219,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
             "max_bounces": plan.max_bounces,
             "stokes": stokes,
             "phi_i": "uniform" if plan.phi_i is None else plan.phi_i,
+            "source_half_angle": plan.half_angle,
+            "folded": plan.fold,
             "target_rel_error": np.nan if target is None else target,
             "intersector": "height-field walk" if "walk" in allowed else "embree",
             "explanation": _explain(scene, plan) if explain else [],
@@ -239,15 +258,27 @@ def _realize(
     return WetField.of(target, surface, scene.contaminants, plan.media, seed)
 
 
+def _taken(spare: deque[Tally]) -> Tally | None:
+    try:
+        return spare.pop()
+    except IndexError:
+        return None
+
+
 def _trace_fixed(
-    target: Field | EmbreeField | WetField, plan: Plan, seed: np.random.SeedSequence
+    target: Field | EmbreeField | WetField,
+    plan: Plan,
+    spare: deque[Tally],
+    seed: np.random.SeedSequence,
 ) -> Tally:
-    return trace_sample(target, plan, seed)
+    return trace_sample(target, plan, seed, _taken(spare))
 
 
-def _trace_realization(scene: Scene, plan: Plan, seed: np.random.SeedSequence) -> Tally:
+def _trace_realization(
+    scene: Scene, plan: Plan, spare: deque[Tally], seed: np.random.SeedSequence
+) -> Tally:
     heights, rays = seed.spawn(2)
-    return trace_sample(_realize(scene, plan, heights), plan, rays)
+    return trace_sample(_realize(scene, plan, heights), plan, rays, _taken(spare))
 
 
 def _explain(scene: Scene, plan: Plan) -> list[str]:
@@ -325,6 +356,51 @@ def _azimuth(phi_i: float | str) -> float | None:
         msg = f"phi_i must be one angle [rad], got shape {value.shape}. Run once for each."
         raise ValueError(msg)
     return float(value)
+
+
+def _half_angle(value: float, angles: np.ndarray, *, clean: bool) -> float:
+    half = float(
+        require(
+            "source_half_angle",
+            value,
+            lambda v: (v >= 0) & (v <= WIDEST_SOURCE),
+            f"lie in [0, {WIDEST_SOURCE}] rad",
+            "Angles are radians; use np.deg2rad.",
+        )
+    )
+    if half > 0.0 and angles.max() + half >= np.pi / 2:
+        msg = (
+            f"source_half_angle must leave the cone above the horizon [rad], got {half:g} "
+            f"about theta_i {angles.max():g}. Take a smaller cone or a steeper source."
+        )
+        raise ValueError(msg)
+    if half > 0.0 and not clean:
+        msg = (
+            f"source_half_angle must be 0 among contaminants [rad], got {half:g}. "
+            "Average simulations of several directions."
+        )
+        raise ValueError(msg)
+    return half
+
+
+def _mirrored(fold: bool, scene: Scene, phi_i: float | str) -> bool:
+    """`fold`, if the scene is its own mirror image in the mean."""
+    surface = scene.surface
+    symmetric = (
+        isinstance(surface, GaussianSurface)
+        and np.unique(surface.corr_length).size == 1
+        and np.unique(surface.spacing).size == 1
+        and not scene.contaminants
+        and isinstance(phi_i, str)
+    )
+    if fold and not symmetric:
+        msg = (
+            "fold must be left out where the mean is not its own mirror image, got a "
+            f"{type(surface).__name__} and phi_i {phi_i!r}. It takes a clean isotropic "
+            'GaussianSurface with dx = dy, and phi_i="uniform".'
+        )
+        raise ValueError(msg)
+    return fold
 
 
 def _count(name: str, value: int, least: int) -> int:

@@ -22,6 +22,18 @@ def simulate(
             "--phi-i-deg", help="Azimuth of the source, or uniform for its average."
         ),
     ] = "0",
+    source_half_angle: Annotated[
+        float,
+        typer.Option(
+            "--source-half-angle-deg", min=0.0, max=28.0, help="Half-angle of the source."
+        ),
+    ] = 0.0,
+    fold: Annotated[
+        bool,
+        typer.Option(
+            "--fold", help="Average with the mirror image, for isotropic random surfaces."
+        ),
+    ] = False,
     output: options.Output = None,
     force: options.Force = False,
     n_rays: options.Rays = 100_000,
@@ -76,6 +88,8 @@ def simulate(
                 workers=workers,
                 progress=progress,
                 explain=explain,
+                source_half_angle=float(np.deg2rad(source_half_angle)),
+                fold=fold,
             )
         write_result(result, stage)
     for line in result.attrs["explanation"]:

@@ -14,14 +14,18 @@ TWO_PI = 2.0 * math.pi
 # Irrational strides: successive lines take evenly spread offsets and azimuths for any count
 STRIDE_OFFSET = 0.6180339887498949
 STRIDE_PHI = 0.7548776662466927
+STRIDE_RADIUS = 0.5698402909980532
+STRIDE_ANGLE = 0.8191725133961645
 
 
 # Rays of one incident direction: zenith and azimuth of the source (uniform: any azimuth),
 # the entry rectangle (corner x, y and lengths [cells]), lines and rays, three random shifts
-# in [0, 1) (lines, offsets, azimuths), and the stream of random numbers of a diffuse base
+# in [0, 1) (lines, offsets, azimuths) and with a spread two more, the stream of random
+# numbers of a diffuse base, and the sine of the half-angle of the source
 Source = namedtuple(
     "Source",
-    "sin_theta cos_theta phi uniform_phi launch n_lines n_rays shifts stream",
+    "sin_theta cos_theta phi uniform_phi launch n_lines n_rays shifts stream spread",
+    defaults=(0.0,),
 )
 
 
@@ -32,24 +36,66 @@ def fraction(x):
 
 
 @jit(forceinline=True)
-def entry_line(line, source, pitch_x, pitch_y):
-    """One line of entry points, followed in the direction in which the light travels.
+def line_beam(line, source):
+    """Light of one line: where it comes from, and its frame.
 
-    Returns the start (x, y), the speed per unit of s [cells], of which one component is +1
-    or
-    -1, the range of s, the length of a unit of s [um], the offset of the first ray in units
-    of the ray spacing, and cos and sin of the azimuth of the source.
+    The source is a disc of uniform radiance: directions spread over its cone so that equal
+    parts of the flux through the mean surface, equal areas of the ellipse into which the
+    plane sees it, get equally many lines. A polariser in front of it is carried along the
+    great circle from the axis of the cone.
+
+    Returns cos and sin of the azimuth from which dphi counts, sin and cos of the zenith
+    angle and cos and sin of the azimuth of the light, and its s axis.
     """
-    launch, shifts = source.launch, source.shifts
+    shifts = source.shifts
     phi = source.phi
     if source.uniform_phi:
         phi = TWO_PI * fraction(line * STRIDE_PHI + shifts[2])
     cos_phi = math.cos(phi)
     sin_phi = math.sin(phi)
+    sin_t, cos_t = source.sin_theta, source.cos_theta
+    if source.spread == 0.0:
+        return cos_phi, sin_phi, sin_t, cos_t, cos_phi, sin_phi, sin_phi, -cos_phi, 0.0
+
+    # The axis and two directions across it; `along` lies in its meridian plane
+    radius = source.spread * math.sqrt(fraction(line * STRIDE_RADIUS + shifts[3]))
+    angle = TWO_PI * fraction(line * STRIDE_ANGLE + shifts[4])
+    along = radius * math.cos(angle)
+    across = radius * math.sin(angle)
+    middle = math.sqrt(1.0 - source.spread * source.spread)
+    forward = middle * sin_t + along * cos_t
+    x = forward * cos_phi - across * sin_phi
+    y = forward * sin_phi + across * cos_phi
+    level = math.sqrt(x * x + y * y)
+    z = math.sqrt(max(1.0 - level * level, 0.0))
+    # Beams travel along k = -(x, y, z), that of the axis along a: s - (s . k)/(1 + a . k)
+    # (a + k) carries the axis s of a to k
+    s_x, s_y = sin_phi, -cos_phi
+    share = (s_x * x + s_y * y) / (
+        1.0 + x * sin_t * cos_phi + y * sin_t * sin_phi + z * cos_t
+    )
+    s_x -= share * (sin_t * cos_phi + x)
+    s_y -= share * (sin_t * sin_phi + y)
+    s_z = -share * (cos_t + z)
+    if level == 0.0:
+        return cos_phi, sin_phi, 0.0, 1.0, cos_phi, sin_phi, s_x, s_y, s_z
+    return cos_phi, sin_phi, level, z, x / level, y / level, s_x, s_y, s_z
+
+
+@jit(forceinline=True)
+def entry_line(line, source, pitch_x, pitch_y):
+    """One line of entry points, followed in the direction in which the light travels.
+
+    Returns the start (x, y), the speed per unit of s [cells], of which one component is +1
+    or -1, the range of s, the length of a unit of s [um], the offset of the first ray in
+    units of the ray spacing, and cos and sin of the azimuth of the source.
+    """
+    launch, shifts = source.launch, source.shifts
+    cos_phi, sin_phi, _, _, cos_b, sin_b, _, _, _ = line_beam(line, source)
     across = (line + shifts[0]) / source.n_lines
     offset = fraction(line * STRIDE_OFFSET + shifts[1])
-    down_x = -cos_phi / pitch_x
-    down_y = -sin_phi / pitch_y
+    down_x = -cos_b / pitch_x
+    down_y = -sin_b / pitch_y
     if abs(down_x) >= abs(down_y):
         unit = 1.0 / abs(down_x)
         start_x = launch[0] if down_x > 0.0 else launch[0] + launch[2]

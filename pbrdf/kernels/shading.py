@@ -134,22 +134,34 @@ def scatter_column(strength, a_in, b_in, a_out, b_out, column, mueller):
     mueller[3, column] = 0.0
 
 
+@jit(forceinline=True)
+def turn_columns(c2, s2, n_stokes, mueller):
+    """Turn the frame of all columns of a matrix."""
+    for column in range(n_stokes):
+        q = mueller[1, column]
+        u = mueller[2, column]
+        mueller[1, column] = c2 * q + s2 * u
+        mueller[2, column] = c2 * u - s2 * q
+
+
+@jit(forceinline=True)
+def begin_columns(n_stokes, mueller):
+    """Begin with the unit matrix: light as it comes from the source."""
+    for row in range(4):
+        for column in range(n_stokes):
+            mueller[row, column] = 1.0 if row == column else 0.0
+
+
 @jit(allocates=False)
 def reflect_often(record, ray, bounces, w, optics, n_stokes, mueller):
     """Mueller matrix of a path of any length, all its columns side by side."""
     n, kappa, base = optics.n, optics.kappa, optics.base
-    for row in range(4):
-        for column in range(n_stokes):
-            mueller[row, column] = 1.0 if row == column else 0.0
+    begin_columns(n_stokes, mueller)
     for bounce in range(bounces + 1):
         # Into the frame of the facet, or after the last bounce of the exit direction
-        c2 = record[bounce, ray, TURN_C]
-        s2 = record[bounce, ray, TURN_S]
-        for column in range(n_stokes):
-            q = mueller[1, column]
-            u = mueller[2, column]
-            mueller[1, column] = c2 * q + s2 * u
-            mueller[2, column] = c2 * u - s2 * q
+        turn_columns(
+            record[bounce, ray, TURN_C], record[bounce, ray, TURN_S], n_stokes, mueller
+        )
         if bounce == bounces:
             break
         cos_in = record[bounce, ray, COS_IN]

@@ -32,9 +32,12 @@ from pbrdf.kernels.shading import (
     SPECULAR,
     TURN_C,
     TURN_S,
+    begin_columns,
     lost_energy,
+    reflect_column,
     reflect_often,
     reflect_twice,
+    turn_columns,
 )
 
 MIN_ORDER, MAX_ORDER = 3, 8
@@ -236,6 +239,43 @@ def gather_path(
         keep_path(end, record, ray, bounces, i_theta, i_dphi, spectra, optics, tally)
 
 
+@jit(forceinline=True)
+def mirror_path(paths, row, bounces, w, table, n_stokes, mueller):
+    """Mueller matrix of a path of mirror reflections alone, with tabulated elements.
+
+    Returns False where the path left from a diffuse base; its matrix is then not computed.
+    """
+    for bounce in range(bounces):
+        if paths[row + bounce, 0, COS_OUT] != SPECULAR:
+            return False
+    if bounces == 2:
+        a, b, c, d = table_elements(
+            table, w, int(paths[row, 0, LABEL]), paths[row, 0, COS_IN]
+        )
+        a2, b2, c2, d2 = table_elements(
+            table, w, int(paths[row + 1, 0, LABEL]), paths[row + 1, 0, COS_IN]
+        )
+        reflect_twice(
+            a, b, c, d, a2, b2, c2, d2,
+            paths[row, 0, TURN_C], paths[row, 0, TURN_S],
+            paths[row + 1, 0, TURN_C], paths[row + 1, 0, TURN_S],
+            paths[row + 2, 0, TURN_C], paths[row + 2, 0, TURN_S], n_stokes, mueller,
+        )  # fmt: skip
+        return True
+    begin_columns(n_stokes, mueller)
+    for bounce in range(bounces):
+        here = row + bounce
+        turn_columns(paths[here, 0, TURN_C], paths[here, 0, TURN_S], n_stokes, mueller)
+        a, b, c, d = table_elements(
+            table, w, int(paths[here, 0, LABEL]), paths[here, 0, COS_IN]
+        )
+        for column in range(n_stokes):
+            reflect_column(a, b, c, d, column, mueller)
+    here = row + bounces
+    turn_columns(paths[here, 0, TURN_C], paths[here, 0, TURN_S], n_stokes, mueller)
+    return True
+
+
 @jit(allocates=False)
 def shade_paths(spectra, optics, tally):
     """Shade the paths of the buffer, wavelength by wavelength, and empty it."""
@@ -247,34 +287,19 @@ def shade_paths(spectra, optics, tally):
             end = int(paths[row, 0, P_END])
             bounces = int(paths[row, 0, P_BOUNCES])
             n_stokes = optics.n_stokes if end == N_ESCAPED else 1
-            one, two, out = row + 1, row + 2, row + bounces + 1
-            mirrors = paths[one, 0, COS_OUT] == SPECULAR == paths[two, 0, COS_OUT]
-            if bounces == 2 and mirrors:
-                a1, b1, c1, d1 = table_elements(
-                    table, w, int(paths[one, 0, LABEL]), paths[one, 0, COS_IN]
-                )
-                a2, b2, c2, d2 = table_elements(
-                    table, w, int(paths[two, 0, LABEL]), paths[two, 0, COS_IN]
-                )
-                reflect_twice(
-                    a1, b1, c1, d1, a2, b2, c2, d2,
-                    paths[one, 0, TURN_C], paths[one, 0, TURN_S],
-                    paths[two, 0, TURN_C], paths[two, 0, TURN_S],
-                    paths[out, 0, TURN_C], paths[out, 0, TURN_S], n_stokes, mueller,
-                )  # fmt: skip
-            else:
-                reflect_often(paths[one:], 0, bounces, w, optics, n_stokes, mueller)
+            if not mirror_path(paths, row + 1, bounces, w, table, n_stokes, mueller):
+                reflect_often(paths[row + 1 :], 0, bounces, w, optics, n_stokes, mueller)
             energy[w, ABSORBED] -= mueller[0, 0]
-            if end == N_ESCAPED:
+            if end != N_ESCAPED:
+                energy[w, lost_energy(end)] += mueller[0, 0]
+            else:
                 i_theta = int(paths[row, 0, P_THETA])
                 i_dphi = int(paths[row, 0, P_DPHI])
                 order = min(bounces, flux.shape[1]) - 1
                 for i in range(n_stokes):
                     for j in range(n_stokes):
                         flux[w, order, i_theta, i_dphi, i, j] += mueller[i, j]
-            else:
-                energy[w, lost_energy(end)] += mueller[0, 0]
-            row = out + 1
+            row += bounces + 2
     spectra.fill[0] = 0
 
 

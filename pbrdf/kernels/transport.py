@@ -9,7 +9,7 @@ the record up to its own hit.
 import math
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.entry import TWO_PI, entry_line, first_ray, wrap_into
+from pbrdf.kernels.entry import TWO_PI, entry_line, first_ray, line_beam, wrap_into
 from pbrdf.kernels.frames import PARALLEL, turn_frame
 from pbrdf.kernels.heightfield import (
     ESCAPED,
@@ -162,13 +162,15 @@ def scatter(slope_x, slope_y, draw_a, draw_b):
 
 @jit(forceinline=True)
 def trace_ray(
-    terrain, fate, i, j, facet, u, v, z, cos_phi, sin_phi, source, number,
+    terrain, fate, i, j, facet, u, v, z, beam, stream, number,
     record, waiting, spectra, optics, tally,
 ):  # fmt: skip
     """Follow a ray from its first meeting with the surface until all its light has left.
 
-    `fate` says what became of it so far: HIT on the facet given, or what `walk` returned.
+    `fate` says what became of it so far: HIT on the facet given, or what `walk` returned;
+    `beam` is the light of its line as `line_beam` tells.
     """
+    cos_phi, sin_phi, sin_t, cos_t, cos_b, sin_b, s_x, s_y, s_z = beam
     labels = terrain.labels
     max_bounces = record.shape[0] - 1
     splits = optics.base.shape[1] > 0
@@ -179,13 +181,10 @@ def trace_ray(
         for w in range(tally.energy.shape[0]):
             tally.energy[w, ABSORBED] += 1.0
     tally.counts[N_SEGMENTS] += 1
-    # The beam travels against dir_i; its frame has e_s horizontal
-    k_x = -source.sin_theta * cos_phi
-    k_y = -source.sin_theta * sin_phi
-    k_z = -source.cos_theta
-    s_x = sin_phi
-    s_y = -cos_phi
-    s_z = 0.0
+    # The beam travels away from the source
+    k_x = -sin_t * cos_b
+    k_y = -sin_t * sin_b
+    k_z = -cos_t
     bounces = 0
     n_waiting = 0
     events = 0
@@ -194,7 +193,7 @@ def trace_ray(
             slope_x, slope_y = facet_slopes(terrain, i, j, facet)
             if splits:
                 # A second ray leaves the base under the interface
-                draw_a, draw_b = uniform_pair(source.stream, number, events)
+                draw_a, draw_b = uniform_pair(stream, number, events)
                 events += 1
                 waiting[n_waiting, W_I] = i
                 waiting[n_waiting, W_J] = j
@@ -283,9 +282,11 @@ def trace_batch(terrain, source, record, waiting, spectra, optics, tally):
     """
     launch = source.launch
     for line in range(source.n_lines):
-        start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = (
-            entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
+        start_x, start_y, speed_x, speed_y, length, _, offset, _, _ = entry_line(
+            line, source, terrain.pitch_x, terrain.pitch_y
         )
+        beam = line_beam(line, source)
+        _, _, sin_t, cos_t, cos_b, sin_b, _, _, _ = beam
         first = first_ray(line, source)
         rays = first_ray(line + 1, source) - first
         for ray in range(rays):
@@ -296,12 +297,11 @@ def trace_batch(terrain, source, record, waiting, spectra, optics, tally):
             j = min(int(y), terrain.heights.shape[1] - 1)
             fate, i, j, facet, u, v, z = walk(
                 terrain, i, j, -1, x - i, y - j, terrain.z_top,
-                -source.sin_theta * cos_phi / terrain.pitch_x,
-                -source.sin_theta * sin_phi / terrain.pitch_y,
-                -source.cos_theta, 0.0, MAX_STEPS,
+                -sin_t * cos_b / terrain.pitch_x, -sin_t * sin_b / terrain.pitch_y,
+                -cos_t, 0.0, MAX_STEPS,
             )  # fmt: skip
             trace_ray(
-                terrain, fate, i, j, facet, u, v, z, cos_phi, sin_phi, source, first + ray,
+                terrain, fate, i, j, facet, u, v, z, beam, source.stream, first + ray,
                 record, waiting, spectra, optics, tally,
             )  # fmt: skip
 
@@ -318,12 +318,14 @@ def sweep_batch(terrain, source, record, waiting, spectra, optics, tally):
     nx, ny = terrain.heights.shape
     z_top = terrain.z_top
     for line in range(source.n_lines):
-        start_x, start_y, speed_x, speed_y, length, unit, offset, cos_phi, sin_phi = (
-            entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
+        start_x, start_y, speed_x, speed_y, length, unit, offset, _, _ = entry_line(
+            line, source, terrain.pitch_x, terrain.pitch_y
         )
+        beam = line_beam(line, source)
+        _, _, sin_t, cos_t, _, _, _, _, _ = beam
         first = first_ray(line, source)
         rays = first_ray(line + 1, source) - first
-        drift = source.sin_theta / source.cos_theta / unit  # in s per height
+        drift = sin_t / cos_t / unit  # in s per height
         forward_x = speed_x >= 0.0
         forward_y = speed_y >= 0.0
         per_x = 1.0 / speed_x if speed_x != 0.0 else NEVER
@@ -372,7 +374,7 @@ def sweep_batch(terrain, source, record, waiting, spectra, optics, tally):
                         trace_ray(
                             terrain, HIT, i, j, facet, u_a + share * (u_b - u_a),
                             v_a + share * (v_b - v_a), z_a + share * (z_b - z_a),
-                            cos_phi, sin_phi, source, first + ray,
+                            beam, source.stream, first + ray,
                             record, waiting, spectra, optics, tally,
                         )  # fmt: skip
                         ray += 1

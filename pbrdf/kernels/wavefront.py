@@ -10,7 +10,7 @@ import math
 from collections import namedtuple
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.entry import entry_line, first_ray, wrap_into
+from pbrdf.kernels.entry import entry_line, first_ray, line_beam, wrap_into
 from pbrdf.kernels.heightfield import cell_counts, facet_slopes, facet_steps
 from pbrdf.kernels.shading import (
     ABSORBED,
@@ -70,8 +70,11 @@ def enter_rays(terrain, source, first, state, cell, active):
             line = ((first + k) * source.n_lines) // source.n_rays
             start = first_ray(line, source)
             end = first_ray(line + 1, source)
-            start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = (
-                entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
+            start_x, start_y, speed_x, speed_y, length, _, offset, _, _ = entry_line(
+                line, source, terrain.pitch_x, terrain.pitch_y
+            )
+            cos_phi, sin_phi, sin_t, cos_t, cos_b, sin_b, s_x, s_y, s_z = line_beam(
+                line, source
             )
         s = length * ((first + k - start + offset) / (end - start))
         x = wrap_into(start_x + speed_x * s, launch[0], launch[2])
@@ -83,12 +86,12 @@ def enter_rays(terrain, source, first, state, cell, active):
         state[k, Z] = terrain.z_top
         state[k, COS_PHI] = cos_phi
         state[k, SIN_PHI] = sin_phi
-        state[k, KX] = -source.sin_theta * state[k, COS_PHI]
-        state[k, KY] = -source.sin_theta * state[k, SIN_PHI]
-        state[k, KZ] = -source.cos_theta
-        state[k, SX] = state[k, SIN_PHI]
-        state[k, SY] = -state[k, COS_PHI]
-        state[k, SZ] = 0.0
+        state[k, KX] = -sin_t * cos_b
+        state[k, KY] = -sin_t * sin_b
+        state[k, KZ] = -cos_t
+        state[k, SX] = s_x
+        state[k, SY] = s_y
+        state[k, SZ] = s_z
         cell[k, CELL_I] = i
         cell[k, CELL_J] = j
         cell[k, FACET] = -1

@@ -15,7 +15,23 @@ GUARD_HEIGHTS = 2.0
 GUARD_SHARE = 0.125
 # Least share of the area of a finite map that must be left for entry points
 LEAST_INTERIOR = 0.1
+# As many times more lines of entry points carry the directions of a source of some width
+LINES_OF_A_DISC = 4
 NO_LABELS = np.empty((0, 0), dtype=np.uint8)
+
+
+def cone_rim(
+    theta_i: float, phi_i: float, half_angle: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Horizontal components of directions on the rim of a cone about (theta_i, phi_i)."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 181 if half_angle > 0.0 else 1)
+    forward = np.cos(half_angle) * np.sin(theta_i)
+    forward = forward + np.sin(half_angle) * np.cos(turn) * np.cos(theta_i)
+    across = np.sin(half_angle) * np.sin(turn)
+    return (
+        forward * np.cos(phi_i) - across * np.sin(phi_i),
+        forward * np.sin(phi_i) + across * np.cos(phi_i),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,18 +86,24 @@ class Field:
         """Height of the highest node above the lowest. [um]"""
         return float(self.terrain.z_top - self.z_bottom)
 
-    def entry_lines(self, launch: np.ndarray, n_rays: int) -> int:
-        """Count the lines that space `n_rays` rays evenly both along and across them."""
+    def entry_lines(self, launch: np.ndarray, n_rays: int, half_angle: float = 0.0) -> int:
+        """Count the lines that space `n_rays` rays evenly both along and across them.
+
+        All rays of a line come from one direction: a source of some width has more lines.
+        """
         width, depth = launch[2] * self.pitch[0], launch[3] * self.pitch[1]
         aspect = min(width, depth) / max(width, depth)
-        return max(1, round(np.sqrt(n_rays * aspect)))
+        lines = round(np.sqrt(n_rays * aspect))
+        return max(1, min(lines * (LINES_OF_A_DISC if half_angle > 0.0 else 1), n_rays))
 
-    def entry_rectangle(self, theta_i: float, phi_i: float | None) -> np.ndarray:
+    def entry_rectangle(
+        self, theta_i: float, phi_i: float | None, half_angle: float = 0.0
+    ) -> np.ndarray:
         """Corner x, y and lengths [cells] of the entry points in the top plane, shape (4,).
 
         On a periodic surface it is the whole period. On a finite map it is where light from
         (theta_i, phi_i) [rad] (None: from any azimuth) reaches the lowest point inside the
-        map, less a guard rim.
+        map, less a guard rim, for every direction within `half_angle` [rad] of it.
 
         Raises
         ------
@@ -94,19 +116,24 @@ class Field:
         height_range = self.height_range
         sides = np.array([nx - 1.0, ny - 1.0])
         pitch = np.asarray(self.pitch)
-        drift = -np.tan(theta_i) * height_range / pitch
+        steepest = theta_i + half_angle
         if phi_i is None:
-            below, above = -np.abs(drift), np.abs(drift)
+            drift = np.tan(steepest) * height_range / pitch
+            below, above = -drift, drift
         else:
-            drift = drift * np.array([np.cos(phi_i), np.sin(phi_i)])
-            below, above = np.minimum(drift, 0.0), np.maximum(drift, 0.0)
+            x, y = cone_rim(theta_i, phi_i, half_angle)
+            # Height falls from the top to the bottom: cells crossed along x and y
+            drift = np.stack([x, y]) / np.sqrt(1.0 - x * x - y * y) * -height_range
+            drift /= pitch[:, None]
+            below = np.minimum(drift.min(axis=1), 0.0)
+            above = np.maximum(drift.max(axis=1), 0.0)
         guard = np.minimum(GUARD_HEIGHTS * height_range / pitch, GUARD_SHARE * sides)
         # The hits lie between the entry point and the entry point plus the drift
         low = guard - below
         high = sides - guard - above
         lengths = high - low
         if lengths.min() <= 0.0 or lengths.prod() < LEAST_INTERIOR * sides.prod():
-            reach = np.tan(theta_i) * height_range
+            reach = np.tan(steepest) * height_range
             msg = (
                 f"theta_i must suit the size of the finite map, got {theta_i:g} rad: light "
                 f"crosses {reach:.3g} um of it on its way down a height range of "

@@ -1,7 +1,7 @@
 """What is traced over one surface sample, and the tally that comes back."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from pbrdf.conventions import BOUNCES, detector_bins
 from pbrdf.kernels import shading
-from pbrdf.kernels.moments import add_sample
+from pbrdf.kernels.moments import add_sample, fold_mirror
 from pbrdf.kernels.spectra import N_SUMS
 from pbrdf.kernels.transparent import Media
 from pbrdf.tracer.spectra import WORTHWHILE, Spectrum
@@ -39,6 +39,10 @@ class Plan:
         Names of the skips of `pbrdf.tracer.skips` that are allowed.
     media : Media or None
         Constants of what lies on the surface; None on a clean one.
+    half_angle : float
+        Half-angle of the source. [rad]
+    fold : bool
+        Whether each sample is averaged with its mirror image in the plane of incidence.
     """
 
     theta_i: np.ndarray
@@ -53,6 +57,8 @@ class Plan:
     n_dphi: int
     skips: frozenset[str] = frozenset()
     media: Media | None = None
+    half_angle: float = 0.0
+    fold: bool = False
 
     @property
     def splits(self) -> bool:
@@ -65,8 +71,10 @@ class Plan:
         if "spectra" not in self.skips or len(self.n) < WORTHWHILE:
             return None
         n_sums = 1 if self.n_stokes == 1 else N_SUMS
-        shape = (self.n_theta, self.n_dphi)
-        return Spectrum.of(self.n, self.kappa, self.theta_i, shape, n_sums=n_sums)
+        return Spectrum.of(
+            self.n, self.kappa, self.theta_i, (self.n_theta, self.n_dphi),
+            half_angle=self.half_angle, n_sums=n_sums,
+        )  # fmt: skip
 
     @property
     def tally_shape(self) -> tuple[int, ...]:
@@ -102,6 +110,12 @@ class Tally:
             counts=np.zeros((angles, shading.N_COUNTS), dtype=np.int64),
         )
 
+    def emptied(self) -> "Tally":
+        """Give the same arrays for another sample; `Moments.add` has cleared the flux."""
+        self.energy.fill(0.0)
+        self.counts.fill(0)
+        return replace(self, reports=(), notes=())
+
 
 class Moments:
     """Mean and standard error over samples, added in a fixed order."""
@@ -117,16 +131,17 @@ class Moments:
         self._scatter = np.zeros(shape)
         self._mean_total = np.zeros(shape[:2] + shape[3:])
         self._scatter_total = np.zeros(shape[:2] + shape[3:])
+        self._room = np.empty((plan.n_theta * plan.n_dphi, plan.n_stokes**2))
         self._albedo: list[np.ndarray] = []
         self._energy: list[np.ndarray] = []
 
     def add(self, tally: Tally) -> None:
-        """Add one sample."""
+        """Add one sample and clear its flux."""
         self.samples += 1
         self.counts += tally.counts
         self.reports = self.reports or tally.reports
         self.notes |= dict.fromkeys(tally.notes)
-        angles, wavelengths, orders = tally.flux.shape[:3]
+        angles, wavelengths, orders, _, _, elements, _ = tally.flux.shape
         # Rays that left a finite map sideways count in neither part of the fraction; where
         # rays split, only a part of each may leave so and has its own account
         aside = 0 if self.plan.splits else tally.counts[:, shading.N_SIDE]
@@ -141,15 +156,19 @@ class Moments:
             )
             raise ValueError(msg)
         scale = 1.0 / counted
+        by_bin = (wavelengths, orders, -1, elements * elements)
+        of_all = (wavelengths, -1, elements * elements)
+        albedo = np.empty((angles, wavelengths, orders))
         for a in range(angles):
+            if self.plan.fold:
+                fold_mirror(tally.flux[a])
             add_sample(
-                tally.flux[a].reshape(wavelengths, orders, -1), scale[a], self.samples,
-                self._mean[a].reshape(wavelengths, orders, -1),
-                self._scatter[a].reshape(wavelengths, orders, -1),
-                self._mean_total[a].reshape(wavelengths, -1),
-                self._scatter_total[a].reshape(wavelengths, -1),
+                tally.flux[a].reshape(by_bin), scale[a], self.samples, self._room,
+                self._mean[a].reshape(by_bin), self._scatter[a].reshape(by_bin),
+                self._mean_total[a].reshape(of_all),
+                self._scatter_total[a].reshape(of_all), albedo[a],
             )  # fmt: skip
-        self._albedo.append(tally.flux[..., 0, 0].sum(axis=(3, 4)) * scale[:, None, None])
+        self._albedo.append(albedo)
         self._energy.append(tally.energy * scale[:, None, None])
 
     def _stderr(self, mean: np.ndarray, scatter: np.ndarray, one: np.ndarray) -> np.ndarray:

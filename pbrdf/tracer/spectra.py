@@ -11,7 +11,7 @@ from pbrdf.kernels.shading import N_RECORD
 # From this many wavelengths on, sums by bin cost less than every path shaded for each
 WORTHWHILE = 4
 # Rows of the buffer of paths with several bounces: it stays in the cache of a core
-BUFFER = 8192
+BUFFER = 65536
 
 
 def chebyshev_points() -> tuple[np.ndarray, np.ndarray]:
@@ -63,6 +63,7 @@ class Spectrum:
         theta_i: np.ndarray,
         shape: tuple[int, int],
         *,
+        half_angle: float,
         n_sums: int,
     ) -> "Spectrum":
         """Tabulate materials (wavelengths, materials) and lay out bins of a shape."""
@@ -71,7 +72,7 @@ class Spectrum:
         factors = np.empty((4, kernel.MAX_ORDER))
         for theta in theta_i:
             ranges = np.empty((*shape, 2))
-            kernel.cosine_ranges(theta, 0.0, ranges)
+            kernel.cosine_ranges(theta, half_angle, ranges)
             orders = np.empty(shape, dtype=np.int64)
             kernel.choose_orders(ranges, table, POINTS, POWERS, factors, orders)
             ends = n_sums * np.cumsum(orders).reshape(shape)

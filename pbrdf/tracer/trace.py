@@ -33,14 +33,18 @@ def prepare(surface: HeightMap, skips: frozenset[str]) -> Field | EmbreeField:
 
 
 def trace_sample(
-    target: Field | EmbreeField | WetField, plan: Plan, seed: np.random.SeedSequence
+    target: Field | EmbreeField | WetField,
+    plan: Plan,
+    seed: np.random.SeedSequence,
+    room: Tally | None = None,
 ) -> Tally:
     """Trace every incident direction of the plan over one surface.
 
-    Releases the interpreter lock. The streams belong to the sample and the entry points to
-    the stream, so that neither the number of threads nor the intersector changes the rays.
+    `room` is an empty tally to write into; without it one is made. Releases the interpreter
+    lock. The streams belong to the sample and the entry points to the stream, so that
+    neither the number of threads nor the intersector changes the rays.
     """
-    tally = Tally.empty(plan)
+    tally = Tally.empty(plan) if room is None else room
     if isinstance(target, WetField):
         tally = replace(tally, reports=target.reports, notes=target.notes)
     zenith, azimuth = bin_edges(plan.n_theta, plan.n_dphi)
@@ -50,13 +54,16 @@ def trace_sample(
     rng = np.random.default_rng(seed)
     shifts = rng.random((len(plan.theta_i), 3))
     streams = rng.integers(2**63, size=len(plan.theta_i), dtype=np.uint64)
+    if plan.half_angle > 0.0:
+        # Drawn last, so that a narrow beam keeps its rays
+        shifts = np.hstack([shifts, rng.random((len(plan.theta_i), 2))])
     for index, theta in enumerate(plan.theta_i):
         field = target if isinstance(target, Field) else target.field
-        launch = field.entry_rectangle(theta, plan.phi_i)
+        launch = field.entry_rectangle(theta, plan.phi_i, plan.half_angle)
         source = Source(
             np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
-            launch, field.entry_lines(launch, plan.n_rays), plan.n_rays,
-            shifts[index], streams[index],
+            launch, field.entry_lines(launch, plan.n_rays, plan.half_angle), plan.n_rays,
+            shifts[index], streams[index], np.sin(plan.half_angle),
         )  # fmt: skip
         bins = shading.Tally(
             zenith, azimuth, tally.flux[index], tally.energy[index], tally.counts[index],
@@ -66,10 +73,10 @@ def trace_sample(
             trace_waves(target, source, plan.max_bounces, optics, bins)
             continue
         if isinstance(target, WetField):
-            room = Room(np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT))
+            places = Room(np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT))
             trace_among_bodies(
                 target.world, source, field.terrain.z_top, plan.max_bounces,
-                plan.n_stokes, room, bins,
+                plan.n_stokes, places, bins,
             )  # fmt: skip
             continue
         shared = plan.spectrum

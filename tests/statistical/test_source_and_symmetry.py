@@ -1,0 +1,222 @@
+"""Sources of some width, and surfaces that are their own mirror image in the mean."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
+from pbrdf.conventions import detector_bins
+
+ALUMINIUM = Material(0.958, 6.69)
+FLAT = HeightMap.flat(size=(2.0, 3.0))
+ROUGH = GaussianSurface(shape=(96, 80), spacing=1.0, corr_length=8.0, slope_rms=0.3).sample(
+    2
+)
+SOURCE = np.deg2rad(40.0)
+
+
+def disc(theta, phi, half, count):
+    """Directions of a disc of uniform radiance by flux, drawn by rejection from its cap."""
+    rng = np.random.default_rng(5)
+    axis = np.array(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
+    )
+    across = np.array([-np.sin(phi), np.cos(phi), 0.0])
+    along = np.cross(across, axis)
+    cosine = rng.uniform(np.cos(half), 1.0, 4 * count)
+    turn = rng.uniform(0.0, 2.0 * np.pi, 4 * count)
+    sine = np.sqrt(1.0 - cosine**2)
+    found = (
+        cosine[:, None] * axis
+        + (sine * np.cos(turn))[:, None] * along
+        + (sine * np.sin(turn))[:, None] * across
+    )
+    return found[rng.random(4 * count) < found[:, 2]][:count], axis
+
+
+def turn_between(old, new, beam):
+    """Mueller rotations of beams from s axis `old` to `new`."""
+    cos = (old * new).sum(-1)
+    sin = (np.cross(beam, old) * new).sum(-1)
+    turn = np.zeros((*cos.shape, 4, 4))
+    turn[..., 0, 0] = turn[..., 3, 3] = 1.0
+    turn[..., 1, 1] = turn[..., 2, 2] = cos**2 - sin**2
+    turn[..., 1, 2] = 2 * cos * sin
+    turn[..., 2, 1] = -2 * cos * sin
+    return turn
+
+
+def unit(vectors):
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def carried(axis, s, to):
+    """Vector s across `axis`, turned with it along the great circle to each of `to`."""
+    hinge = unit(np.cross(axis, to))
+    angle = np.arccos(np.clip(to @ axis, -1.0, 1.0))[:, None]
+    # Rodrigues' rotation about the hinge
+    return (
+        s * np.cos(angle)
+        + np.cross(hinge, s) * np.sin(angle)
+        + hinge * (hinge @ s)[:, None] * (1.0 - np.cos(angle))
+    )
+
+
+@pytest.mark.parametrize("skips", [True, ("walk",), False])
+@pytest.mark.parametrize(("theta", "phi"), [(SOURCE, 0.7), (0.02, -2.0)])
+def test_flat_metal_mirrors_the_disc_with_its_frames(theta, phi, skips):
+    """All elements of all bins, against directions drawn and frames turned by Rodrigues."""
+    half, n_theta, n_dphi = np.deg2rad(6.0), 30, 24
+    result = simulate(
+        Scene(FLAT, ALUMINIUM), theta, phi_i=phi, n_rays=120_000, source_half_angle=half,
+        n_theta=n_theta, n_dphi=n_dphi, skips=skips,
+    )  # fmt: skip
+    to_source, axis = disc(theta, phi, half, 400_000)
+    beam = -to_source
+    out = beam * [1.0, 1.0, -1.0]
+    across = unit(np.cross(beam, [0.0, 0.0, 1.0]))
+    start = carried(-axis, np.array([np.sin(phi), -np.cos(phi), 0.0]), beam)
+    meridian = unit(np.cross([0.0, 0.0, 1.0], out))
+    index = 0.958 + 6.69j
+    cosine = to_source[:, 2]
+    q = np.sqrt(index**2 - 1 + cosine**2)
+    r_s, r_p = (
+        (cosine - q) / (cosine + q),
+        (index**2 * cosine - q) / (index**2 * cosine + q),
+    )
+    facet = np.zeros((len(out), 4, 4))
+    facet[:, 0, 0] = facet[:, 1, 1] = (abs(r_s) ** 2 + abs(r_p) ** 2) / 2
+    facet[:, 0, 1] = facet[:, 1, 0] = (abs(r_s) ** 2 - abs(r_p) ** 2) / 2
+    facet[:, 2, 2] = facet[:, 3, 3] = (r_s * r_p.conj()).real
+    facet[:, 2, 3] = -(r_s * r_p.conj()).imag
+    facet[:, 3, 2] = (r_s * r_p.conj()).imag
+    mueller = (
+        turn_between(across, meridian, out) @ facet @ turn_between(start, across, beam)
+    )
+    i = np.minimum((np.arccos(out[:, 2]) / (np.pi / 2) * n_theta).astype(int), n_theta - 1)
+    dphi = np.arctan2(out[:, 1], out[:, 0]) - phi
+    j = np.floor(dphi / (2 * np.pi) * n_dphi + 0.5).astype(int) % n_dphi
+    expected = np.zeros((n_theta, n_dphi, 4, 4))
+    np.add.at(expected, (i, j), mueller / len(out))
+    weight = detector_bins(n_theta, n_dphi)[2][..., None, None]
+    flux, stated = (
+        result[name].values[0] * weight for name in ("brdf_total", "brdf_total_stderr")
+    )
+    error = np.hypot(stated, np.sqrt(expected[..., :1, :1] / len(out)))
+    lit = expected[..., :1, :1] > 1e-3
+    z = np.abs(flux - expected) / error * lit
+    assert z.max() < 6.0, z.max()
+    assert np.abs(flux - expected)[~lit[..., 0, 0]].max() < 2e-3
+    assert np.abs(expected[..., 1:, 1:]).max() > 0.02
+    assert_allclose(flux[..., 0, 0].sum(), expected[..., 0, 0].sum(), rtol=2e-3)
+
+
+def test_rough_surface_answers_a_disc_as_the_mean_of_its_directions():
+    """Light by zenith of the detector: wide source against 64 narrow ones."""
+    options = {"n_theta": 9, "n_dphi": 2, "stokes": "unpolarized", "seed": 4}
+    scene, half = Scene(ROUGH, Material(1.5)), 0.4
+    wide = simulate(
+        scene, SOURCE, phi_i=0.5, n_rays=400_000, source_half_angle=half, **options
+    )
+    to_source, _ = disc(SOURCE, 0.5, half, 64)
+    narrow = [
+        simulate(
+            scene, np.arccos(one[2]), phi_i=np.arctan2(one[1], one[0]), n_rays=6400,
+            **options,
+        )
+        for one in to_source
+    ]  # fmt: skip
+    weight = wide.projected_solid_angle
+
+    def light(result):
+        return (result.brdf * weight).sum("dphi").values[..., 0, 0].squeeze()
+
+    singles = np.array([light(result) for result in narrow])
+    # The drawn directions scatter more than the rays of each
+    error = singles.std(axis=0, ddof=1) / np.sqrt(len(singles))
+    z = (light(wide) - singles.mean(axis=0)) / error
+    assert np.abs(z[:2, :7]).max() < 5.0
+    # And the width is seen: the axis alone is not the mean
+    axis = simulate(scene, SOURCE, phi_i=0.5, n_rays=400_000, **options)
+    assert (np.abs(light(wide) - light(axis)) / error).max() > 5.0
+
+
+def test_a_tiny_disc_is_a_beam():
+    scene = Scene(ROUGH, Material(1.5))
+    options = {"n_rays": 32_000, "phi_i": 0.3, "n_theta": 9, "n_dphi": 12}
+    beam, disc_ = (
+        simulate(scene, 0.6, source_half_angle=half, **options) for half in (0.0, 1e-9)
+    )
+    assert beam.attrs["source_half_angle"] == 0.0
+    error = np.hypot(beam.brdf_total_stderr, disc_.brdf_total_stderr)
+    lit = beam.brdf_total > 1e-3
+    assert lit.sum() > 300
+    assert (np.abs(beam.brdf_total - disc_.brdf_total) / error).where(lit).max() < 6.0
+
+
+def test_wide_sources_on_finite_maps_stay_on_the_map():
+    finite = HeightMap(ROUGH.heights, 1.0)
+    result = simulate(
+        Scene(finite, Material.mirror()), 0.5, phi_i=1.0, n_rays=6400, source_half_angle=0.2
+    )
+    assert result.attrs["rays_leaked"] == [0]
+    assert result.side_exits.item() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"source_half_angle": -0.1}, "lie in"),
+        ({"source_half_angle": 10.0}, "Angles are radians"),
+        ({"source_half_angle": 0.4, "theta_i": 1.3}, "above the horizon"),
+        ({"fold": True}, "its own mirror image"),
+    ],
+)
+def test_sources_and_folds_that_make_no_sense_are_refused(options, message):
+    options = {"theta_i": 0.3, "n_rays": 320} | options
+    with pytest.raises(ValueError, match=message):
+        simulate(Scene(ROUGH, Material(1.5)), **options)
+
+
+ISOTROPIC = GaussianSurface(shape=(96, 96), spacing=1.0, corr_length=8.0, slope_rms=0.3)
+ODD = np.array([[0, 0, 1, 1], [0, 0, 1, 1], [1, 1, 0, 0], [1, 1, 0, 0]], dtype=bool)
+
+
+def folded(seed, fold, **options):
+    options = {"n_rays": 2000, "realizations": 16, "n_theta": 6, "n_dphi": 12} | options
+    return simulate(
+        Scene(ISOTROPIC, ALUMINIUM), 0.9, phi_i="uniform", seed=seed, fold=fold, **options
+    )
+
+
+def test_folding_averages_each_bin_with_its_mirror_image():
+    plain, fold = folded(3, False), folded(3, True)
+    mirror = (-np.arange(12)) % 12
+    sign = np.where(ODD, -1.0, 1.0)
+    image = plain.brdf.isel(dphi=mirror).values * sign
+    assert_allclose(fold.brdf, 0.5 * (plain.brdf.values + image), atol=1e-12)
+    assert_array_equal(fold.brdf.values, fold.brdf.isel(dphi=mirror).values * sign)
+    assert_allclose(fold.albedo, plain.albedo, rtol=1e-12)
+    # The image is an estimate of the same thing: unfolded, the two agree within errors
+    error = np.hypot(plain.brdf_stderr, plain.brdf_stderr.isel(dphi=mirror).values)
+    off_axis = [1, 2, 3, 4, 5]
+    z = ((plain.brdf.values - image) / np.where(error > 0, error, np.inf))[
+        :, :, :, off_axis
+    ]
+    assert np.abs(z).max() < 6.0
+
+
+def test_stated_errors_of_folded_runs_are_their_spread():
+    """Half the variance off the plane of incidence, and stated so."""
+    runs = {fold: [folded(100 + s, fold) for s in range(40)] for fold in (False, True)}
+    spread, stated = {}, {}
+    for fold, results in runs.items():
+        column = {"stokes_in": 0, "stokes_out": slice(3), "dphi": slice(1, 6)}
+        values = np.array([r.brdf_total.isel(column).values for r in results])
+        errors = np.array([r.brdf_total_stderr.isel(column).values for r in results])
+        lit = (errors**2).mean(axis=0) < (0.2 * np.abs(values[..., :1].mean(axis=0))) ** 2
+        spread[fold] = values.var(axis=0, ddof=1)[lit].sum()
+        stated[fold] = (errors**2).mean(axis=0)[lit].sum()
+        assert lit.sum() > 15
+        assert 0.85 < np.sqrt(spread[fold] / stated[fold]) < 1.15
+    assert 0.4 < spread[True] / spread[False] < 0.65
