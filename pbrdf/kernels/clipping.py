@@ -17,6 +17,9 @@ LOW, HIGH, CONSTANT, LINEAR, SQUARE = 0, 1, 2, 3, 4
 FAR = 1e300
 ROOT_STEPS = 100
 SOLVER_STEPS = 80
+# How often to look for the lowest point near a body in an ever smaller circle
+FLOORS = 3
+CIRCLE = 16
 
 
 @jit(inline="always")
@@ -232,13 +235,51 @@ def azimuth_share(
 
 
 @jit(allocates=False)
+def mean_near(heights, periodic, pitch_x, pitch_y, x, y, radius):
+    """Mean height of the surface on a circle about (x, y)."""
+    total = 0.0
+    for k in range(CIRCLE):
+        turn = 2.0 * math.pi * k / CIRCLE
+        total += surface_height(
+            heights, periodic, pitch_x, pitch_y,
+            x + radius * math.cos(turn), y + radius * math.sin(turn),
+        )  # fmt: skip
+    return total / CIRCLE
+
+
+@jit(allocates=False)
+def lowest_near(heights, periodic, pitch_x, pitch_y, x, y, reach):
+    """Lowest node of all facets nearer to (x, y) than `reach`."""
+    nx, ny = heights.shape
+    first_i = math.floor((x - reach) / pitch_x)
+    last_i = math.floor((x + reach) / pitch_x) + 1
+    first_j = math.floor((y - reach) / pitch_y)
+    last_j = math.floor((y + reach) / pitch_y) + 1
+    if periodic:
+        last_i, last_j = min(last_i, first_i + nx - 1), min(last_j, first_j + ny - 1)
+    else:
+        first_i, first_j = max(first_i, 0), max(first_j, 0)
+        last_i, last_j = min(last_i, nx - 1), min(last_j, ny - 1)
+    lowest = FAR
+    for i in range(first_i, last_i + 1):
+        row = i - (i // nx) * nx
+        for j in range(first_j, last_j + 1):
+            lowest = min(lowest, heights[row, j - (j // ny) * ny])
+    return lowest
+
+
+@jit(allocates=False)
 def volume_above(heights, periodic, pitch_x, pitch_y, z_min, slabs, x, y, z, azimuths):
     """Volume of a body above the surface and the area it wets, seen from above.
 
     (x, y) is its axis, z its reference height and z_min the lowest point of the surface.
     Returns them and the distance from the axis to the outermost wetted point.
     """
+    # Beyond its radius at the lowest point near it a body is below the surface
     reach = widest_above(slabs, z_min - z) * (1.0 + 1e-12)
+    for _ in range(FLOORS):
+        floor = lowest_near(heights, periodic, pitch_x, pitch_y, x, y, reach)
+        reach = min(reach, widest_above(slabs, floor - z) * (1.0 + 1e-12))
     volume = 0.0
     wetted = 0.0
     outermost = 0.0

@@ -132,7 +132,9 @@ class Ground:
         margin = 1e-6 * shape.height
         low, high = self.lowest - margin, self.highest + margin
         azimuths = self.azimuths(shape.radius)
-        start = 0.5 * (low + high)
+        # The mean square distance from the axis of a disc is half that of its rim
+        radius = float(np.sqrt(0.5)) * shape.base_radius
+        start = float(clipping.mean_near(*self._grid, x, y, radius))
         # Most of the way with few azimuths, the rest with all
         for count in (azimuths // 8, azimuths):
             found = clipping.settled_height(

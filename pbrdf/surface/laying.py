@@ -33,11 +33,17 @@ class Laid:
 
 
 def lay(
-    ground: Ground, maker: ShapeMaker, x: np.ndarray, y: np.ndarray, volumes: np.ndarray
+    ground: Ground,
+    maker: ShapeMaker,
+    x: np.ndarray,
+    y: np.ndarray,
+    volumes: np.ndarray,
+    rests: Sequence[Rest] | None = None,
 ) -> Laid:
-    """Lay drops of these volumes [um³] at these axes [um]."""
+    """Lay drops of these volumes [um³] at these axes [um], where `rests` does not yet."""
     shapes = maker.shapes(volumes)
-    rests = [ground.settle(*drop) for drop in zip(shapes, x, y, strict=True)]
+    if rests is None:
+        rests = [ground.settle(*drop) for drop in zip(shapes, x, y, strict=True)]
     reach = np.array(
         [max(s.radius, rest.rim) for s, rest in zip(shapes, rests, strict=True)]
     )
@@ -86,13 +92,15 @@ def thrown(
         assert coverage is not None
         volumes = maker.volumes_covering(radii, coverage * ground.area)
     shapes = maker.shapes(volumes)
-    x, y = population.scatter(
-        ground,
-        np.array([shape.radius for shape in shapes]),
-        rng,
-        lambda k, x, y: max(shapes[k].radius, ground.settle(shapes[k], x, y).rim),
-    )
-    return lay(ground, maker, x, y, volumes)
+    rests: dict[int, Rest] = {}
+
+    def reach(k: int, x: float, y: float) -> float:
+        rests[k] = ground.settle(shapes[k], x, y)
+        return max(shapes[k].radius, rests[k].rim)
+
+    radii = np.array([shape.radius for shape in shapes])
+    x, y = population.scatter(ground, radii, rng, reach)
+    return lay(ground, maker, x, y, volumes, [rests[k] for k in range(number)])
 
 
 def grown(
