@@ -236,12 +236,33 @@ def test_overlay_is_drawn_on_the_edge(tmp_path):
 
 @pytest.mark.parametrize(
     "name",
-    ["camera", "astronaut", "brick", "grass", "gravel", "coins", "page", "moon", "text"],
-)
+    ["camera", "astronaut", "brick", "grass", "gravel", "coins", "page", "moon", "text",
+     "retina", "immunohistochemistry", "chelsea", "coffee"],
+)  # fmt: skip
 def test_other_pictures_are_refused(tmp_path, name):
     path = save(tmp_path / f"{name}.png", getattr(data, name)())
     with pytest.raises(DataFileError, match="expected"):
         read_profile_images(path, PIXEL)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["astronaut", "chelsea", "immunohistochemistry", "camera"])
+def test_parts_of_other_pictures_are_refused(tmp_path, name):
+    """Crops hold fewer things, so more of them look like two phases with an edge."""
+    picture, rng = getattr(data, name)(), np.random.default_rng(0)
+    taken = 0
+    for _ in range(25):
+        rows, columns = rng.integers(120, min(*picture.shape[:2], 400), 2)
+        top = rng.integers(0, picture.shape[0] - rows)
+        left = rng.integers(0, picture.shape[1] - columns)
+        part = save(tmp_path / "part.png", picture[top : top + rows, left : left + columns])
+        try:
+            read_profile_images(part, PIXEL)
+        except DataFileError:
+            continue
+        taken += 1
+    # The rim of a sleeve before a plain ground is an edge, whatever it belongs to
+    assert taken <= 1
 
 
 @pytest.mark.parametrize(
