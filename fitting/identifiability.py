@@ -7,12 +7,11 @@ import numpy as np
 
 from fitting.observations import Geometry, Observations
 from fitting.problem import Problem, Solved, covariance_rows
+from fitting.result import HARDLY_APART
 from fitting.uncertainty import Information, correlation_matrix, information
 
 __all__ = ["identifiability_warnings", "misfit_warnings"]
 
-# Correlation from which two parameters can hardly be told apart
-_CORRELATED = 0.95
 # What could be measured beside, in the order of the trouble it takes
 _CANDIDATES = ("M00", "M10", "M11", "M22", "M23")
 
@@ -39,7 +38,7 @@ def identifiability_warnings(
         for j in range(i):
             strength = abs(correlation[i, j])
             # nan, for undetermined ones, compares false: those are named above
-            if strength > _CORRELATED:
+            if strength > HARDLY_APART:
                 cure = _cure(problem, solved, [i, j])
                 warnings.append(
                     f"{labels[j]} and {labels[i]} are {_percent(strength)} % correlated; "

@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from fitting.parameters import Parameter
     from fitting.problem import Problem
 
-__all__ = ["FitResult"]
+__all__ = ["HARDLY_APART", "FitResult"]
+
+# Correlation from which two parameters can hardly be told apart
+HARDLY_APART = 0.95
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -136,15 +139,22 @@ class FitResult:
 
     @cached_property
     def profiles(self) -> "dict[str, LikelihoodProfile]":
-        """Likelihood intervals of the parameters that a bound cuts off, by name."""
+        """Likelihood intervals of the parameters that a bound cuts off, by name.
+
+        And of those that can hardly be told apart from one of them: the bound limits both.
+        """
         from fitting.likelihood import profile_likelihood
 
         if not self.converged:
             return {}
+        parameters = self.problem.objective.parameters
+        cut = np.array([self._near_bound(parameter) for parameter in parameters])
+        # nan, for undetermined ones, compares false
+        tied = (np.abs(self.correlation[:, cut]) > HARDLY_APART).any(axis=1)
         return {
-            parameter.name: profile_likelihood(self, parameter.name)
-            for parameter in self.problem.objective.parameters
-            if self._near_bound(parameter)
+            name: profile_likelihood(self, name)
+            for name, profiled in zip(self.names, cut | tied, strict=True)
+            if profiled
         }
 
     def _near_bound(self, parameter: "Parameter") -> bool:
