@@ -161,11 +161,13 @@ def facet_mueller(cones, k_x, k_y, k_z, slope_x, slope_y, index, w, m, n_stokes,
 
 @jit(allocates=False)
 def show_facets(
-    terrain, table, size, inside, cones, points, stream, optics, shown, matrices, counts,
-    mueller,
+    terrain, table, size, inside, cones, points, most, stream, optics, shown, matrices,
+    counts, mueller,
 ):  # fmt: skip
     """Add up the facets that join the two cones.
 
+    points, most    points a facet, and about the most in all: of more, some facets are
+                    drawn at random and stand for the others
     shown       (materials, N_SHOWN) flux of single reflections without the mirror's matrix
     matrices    (wavelengths, stokes, stokes) flux with each path's own; none if of no size
 
@@ -180,7 +182,11 @@ def show_facets(
     from_x, to_x = cell_range(-high, -low, table.low_x, table.per_x, size)
     low, high = conic_extent(b_yy, b_xx, b_zz, b_xy, b_yz, b_xz)
     from_y, to_y = cell_range(-high, -low, table.low_y, table.per_y, size)
-    share = 1.0 / table.facets.size / points
+    near = 0
+    for a in range(from_x, to_x):
+        near += table.start[a * size + to_y] - table.start[a * size + from_y]
+    chance = min(1.0, most / max(near * points, 1))
+    share = 1.0 / table.facets.size / points / chance
     for a in range(from_x, to_x):
         for place in range(table.start[a * size + from_y], table.start[a * size + to_y]):
             number = table.facets[place]
@@ -210,7 +216,8 @@ def show_facets(
                 cones.cos_d, cones.sin_d, cones.cos_i, cones.sin_i,
             )  # fmt: skip
             flux *= share / n_z
-            if flux <= 0.0:
+            draw, _ = uniform_pair(stream, 2 * number * points, 1)
+            if flux <= 0.0 or draw >= chance:
                 continue
             counts[N_FACETS] += 1
             m = labels[i, j] if labels.size > 0 else 0

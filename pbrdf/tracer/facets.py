@@ -10,6 +10,8 @@ from pbrdf.tracer.look import Look, Sums, forward
 # Source azimuths a sample at which the facets of an isotropic surface are asked: as many as
 # bring every facet of the right tilt into sight, within these bounds
 FEWEST_AZIMUTHS, MOST_AZIMUTHS = 8, 64
+# Points a geometry and sample are about as many as its bundles, but not fewer than this
+LEAST_POINTS = 2000
 # Facets a cell of the table of slopes, on average, and the most cells an axis
 FACETS_PER_CELL = 8
 MOST_CELLS = 2048
@@ -39,12 +41,13 @@ def ask_facets(surface: Field, sample: Sums, rng: np.random.Generator) -> None:
         azimuths = _azimuths(look, g, rng.random())
         streams = rng.integers(2**63, size=len(azimuths), dtype=np.uint64)
         points = max(1, -(-look.n_rays // (int(facets) * len(azimuths))))
+        most = max(look.n_rays, LEAST_POINTS) / len(azimuths)
         shown = np.zeros((look.n.shape[1], observe_facets.N_SHOWN))
         matrices = np.zeros((len(look.n) if paths else 0, look.n_stokes, look.n_stokes))
         counts = np.zeros(observe_facets.N_FACET_COUNTS, dtype=np.int64)
         for a, phi_i in enumerate(azimuths):
             observe_facets.show_facets(
-                terrain, table, size, inside, _cones(look, g, phi_i), points,
+                terrain, table, size, inside, _cones(look, g, phi_i), points, most,
                 streams[a], look.optics, shown, matrices, counts, room,
             )  # fmt: skip
         # Points of unknown visibility are taken to be as bright as the others
