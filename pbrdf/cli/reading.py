@@ -1,7 +1,9 @@
 """Read what a user calls a surface: a profile, a map or a micrograph."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 from pbrdf.cli.options import Kind
 
@@ -16,6 +18,7 @@ __all__ = ["read_scan", "read_surface"]
 _IMAGES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 _TEXT = {".csv", ".txt", ".asc", ".dat", ".tsv", ".xyz"}
 _MARKS = "#%;/"
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 def read_surface(
@@ -25,8 +28,12 @@ def read_surface(
     um_per_pixel: float | None = None,
     spacing: float | None = None,
     unit: str | None = None,
+    picture: Mapping[str, Any] = _NOTHING,
 ) -> "Profile | HeightMap":
     """Read a surface file as what it is, or as what the user says it is.
+
+    `picture` holds further arguments of `data_io.read_profile_image` by name, None where
+    the user gave none.
 
     Raises
     ------
@@ -36,20 +43,24 @@ def read_surface(
     import data_io
 
     kind = _kind(path) if kind is Kind.auto else kind
+    given = {name: value for name, value in picture.items() if value is not None}
     unused = {
         "--um-per-pixel": um_per_pixel is not None and kind is not Kind.image,
         "--spacing-um": spacing is not None and kind is not Kind.map,
         "--unit": unit is not None and kind is Kind.image,
-    }
+    } | {f"--{name.replace('_', '-')}": kind is not Kind.image for name in given}
     for option, wrong in unused.items():
         if wrong:
             msg = f"{option} does not belong to a {kind}, got {path.name}. Leave it out."
             raise ValueError(msg)
     if kind is Kind.image:
-        if um_per_pixel is None:
-            msg = f"{path.name} is a picture and has no scale. Give --um-per-pixel."
+        if um_per_pixel is None and "scale_bar_um" not in given:
+            msg = (
+                f"{path.name} is a picture and has no scale. Give --um-per-pixel, "
+                "or the length of its scale bar (pbrdf statistics --scale-bar-um)."
+            )
             raise ValueError(msg)
-        return data_io.read_profile_image(path, um_per_pixel=um_per_pixel)
+        return data_io.read_profile_image(path, um_per_pixel, **given)
     if kind is Kind.profile:
         return data_io.read_profile(path, unit=unit)
     return data_io.read_height_map(path, spacing=spacing, unit=unit)

@@ -1,13 +1,28 @@
 """`pbrdf statistics`: how rough a measured surface is, and how well that is known."""
 
 import json
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from pbrdf.cli import options
 from pbrdf.cli.options import Kind
+
+
+class Phase(StrEnum):
+    """Which side of an edge is the sample."""
+
+    dark = "dark"
+    bright = "bright"
+
+
+class Direction(StrEnum):
+    """How an edge runs."""
+
+    horizontal = "horizontal"
+    vertical = "vertical"
 
 
 def statistics(
@@ -24,18 +39,49 @@ def statistics(
     as_json: Annotated[
         Path | None, typer.Option("--json", help="Write all numbers here.")
     ] = None,
+    scale_bar_um: Annotated[
+        float | None,
+        typer.Option(min=1e-4, max=1e5, help="Length written at a micrograph's scale bar."),
+    ] = None,
+    edge: Annotated[
+        int | None,
+        typer.Option(
+            min=0, help="Which edge of a micrograph, from top or left; else longest."
+        ),
+    ] = None,
+    material: Annotated[
+        Phase | None, typer.Option(help="Which side of a micrograph's edge is the sample.")
+    ] = None,
+    direction: Annotated[
+        Direction | None, typer.Option(help="How the edge runs in a micrograph.")
+    ] = None,
+    overlay: Annotated[
+        Path | None,
+        typer.Option(help="Draw the edge into the micrograph here (png), to check by eye."),
+    ] = None,
     force: options.Force = False,
 ) -> None:
     """Print height, correlation length, slope and noise, each with its uncertainty.
 
-    Example: pbrdf statistics edge.png --um-per-pixel 0.5
+    Examples: pbrdf statistics edge.png --um-per-pixel 0.5
+
+    pbrdf statistics sem.jpg --scale-bar-um 120 --edge 3 --overlay check.png
     """
     from pbrdf.cli.reading import read_surface
     from pbrdf.cli.staging import staged_file
 
+    picture = {
+        "scale_bar_um": scale_bar_um,
+        "edge": edge,
+        "material": material,
+        "direction": direction,
+    }
     heights = read_surface(
-        surface, kind=kind, um_per_pixel=um_per_pixel, spacing=spacing, unit=unit
-    )
+        surface, kind=kind, um_per_pixel=um_per_pixel, spacing=spacing, unit=unit,
+        picture=picture,
+    )  # fmt: skip
+    if overlay is not None:
+        _draw_overlay(overlay, surface, heights, force=force)
 
     from fitting import surface_statistics
 
@@ -50,3 +96,16 @@ def statistics(
             histograms = [found.height_histogram(), found.slope_histogram()]
             histogram_figure(histograms).savefig(stage, dpi=140)
     typer.echo(str(found))
+
+
+def _draw_overlay(overlay: Path, surface: Path, heights: Any, *, force: bool) -> None:
+    """Write the micrograph with its edge drawn in."""
+    from data_io import write_profile_overlay
+    from data_io.micrograph import EdgeProfile
+    from pbrdf.cli.staging import staged_file
+
+    if not isinstance(heights, EdgeProfile):
+        msg = f"--overlay needs a micrograph, got {surface.name}. Leave it out."
+        raise ValueError(msg)
+    with staged_file(overlay, force=force) as stage:
+        write_profile_overlay(stage, surface, [heights])

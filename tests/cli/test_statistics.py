@@ -1,0 +1,68 @@
+"""The options of `pbrdf statistics` that belong to micrographs."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from skimage import io
+
+from examples.micrograph import Camera, gaussian_edge, photograph
+from pbrdf.cli import main
+
+CAMERA = Camera(um_per_pixel=0.5, dust=0.0)
+BAR = 80
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> Path:
+    """A lamella with two edges, the upper one rough, and a scale bar of 40 um."""
+    rng = np.random.default_rng(4)
+    edge = gaussian_edge(rng, 250.0, 1 / 16, height_rms=1.5, corr_length=9.0)
+    upper = photograph(edge, CAMERA, rng)
+    smooth = gaussian_edge(rng, 250.0, 1 / 16, height_rms=0.4, corr_length=9.0)
+    lower = photograph(smooth, CAMERA, rng)[::-1]
+    columns = min(upper.shape[1], lower.shape[1])
+    both = np.concatenate([upper[:, :columns], lower[:, :columns]])
+    both[10:14, 20 : 20 + BAR] = 255
+    path = tmp_path / "lamella.png"
+    io.imsave(path, both, check_contrast=False)
+    return path
+
+
+def height_of(picture: Path, *options: str) -> float:
+    report = picture.with_suffix(".json")
+    assert (
+        main(["statistics", str(picture), "--json", str(report), "--force", *options]) == 0
+    )
+    return json.loads(report.read_text())["height_rms"]["value"]
+
+
+def test_edge_scale_bar_and_overlay_reach_the_reader(picture: Path) -> None:
+    overlay = picture.with_name("overlay.png")
+    rough = height_of(picture, "--um-per-pixel", "0.5", "--edge", "0")
+    smooth = height_of(
+        picture, "--um-per-pixel", "0.5", "--edge", "1", "--overlay", str(overlay)
+    )
+    assert rough > 2.5 * smooth
+    by_bar = height_of(picture, "--scale-bar-um", str(BAR / 2), "--edge", "0")
+    assert by_bar == pytest.approx(rough, rel=0.02)
+    # Green only where the edge of this profile runs: in the lower half
+    drawn = io.imread(overlay).astype(int)
+    green = drawn[..., 1] > drawn[..., 0] + 50
+    assert green[: len(green) // 3].sum() == 0 < green[len(green) // 3 :].sum()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--edge", "0"], "--edge does not belong to a profile"),
+        (["--scale-bar-um", "5"], "--scale-bar-um does not belong to a profile"),
+        (["--overlay", "over.png"], "--overlay needs a micrograph"),
+    ],
+)
+def test_options_of_pictures_are_refused_with_profiles(tmp_path, capsys, options, message):
+    profile = tmp_path / "profile.csv"
+    profile.write_text("x_um,z_um\n" + "".join(f"{x},{np.sin(x):.5f}\n" for x in range(60)))
+    assert main(["statistics", str(profile), *options]) == 2
+    assert message in capsys.readouterr().err
