@@ -22,6 +22,8 @@ _IPOPT_OPTIONS = {
     "print_time": False,
     "show_eval_warnings": False,
     "error_on_fail": False,
+    # The sensitivity to the data, which no one asks for and whose failure is printed
+    "calc_lam_p": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
     "ipopt.tol": 1e-11,

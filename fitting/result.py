@@ -205,7 +205,8 @@ class FitResult:
         for name, value in self.values.items():
             text = _pair(value, self.stderr[name])
             if name in self.profiles:
-                text = f"{text} ({self.profiles[name].interval})"
+                interval = self.profiles[name].interval
+                text = f"{value:.4g} ± {self.stderr[name]:.2g} ({interval})"
             lines.append(f"  {name:<{width}} = {text}")
         quality = "made to fit" if self.n_estimated else f"p = {self.p_value:.2g}"
         lines.append(f"  chi2 / dof = {self.chi2:.4g} / {self.dof} ({quality})")

@@ -155,11 +155,16 @@ def print_fits(fits: Mapping[str, FitResult]) -> None:
     """Print values and misfit of each fit."""
     for title, result in fits.items():
         values = ", ".join(
-            f"{name} {value:.4g} ± {result.stderr[name]:.2g}"
+            f"{name} {value:.4g} ± {result.stderr[name]:.2g}{_interval(result, name)}"
             for name, value in result.values.items()
         )
         state = "" if result.converged else f" NOT CONVERGED: {result.status}"
         print(f"{title}: {values};{state}\n    {'; '.join(misfit(result.readings))}")
+
+
+def _interval(result: FitResult, name: str) -> str:
+    """Return the likelihood interval where a bound makes the symmetric one wrong."""
+    return f" ({result.profiles[name].interval})" if name in result.profiles else ""
 
 
 def misfit(readings: xr.Dataset) -> Iterator[str]:
