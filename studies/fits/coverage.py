@@ -119,13 +119,15 @@ def bound(model, case, noise):
     return information(result.problem.objective.jacobian(truth)).stderr
 
 
-def run(case, n_scans, seed):
-    """Print the coverage of one case over all materials and noises."""
-    lists = {key: [] for key in ("pull", "covered", "ratio")}
-    failures, started_at = 0, time.perf_counter()
+def collect(case, indices, seed):
+    """Fit the scans of these numbers; return pull, covered and ratio by parameter.
+
+    A fit that fails is a row of nan.
+    """
     conditions = [(model, noise) for model in MATERIALS.values() for noise in NOISES]
     bounds = [bound(model, case, noise) for model, noise in conditions]
-    for index in range(n_scans):
+    rows = np.full((len(indices), 3, len(case.free)), np.nan)
+    for row, index in zip(rows, indices, strict=True):
         model, noise = conditions[index % len(conditions)]
         rng = np.random.default_rng([seed, index])
         scans = [
@@ -135,28 +137,29 @@ def run(case, n_scans, seed):
         result = fit(scans, started(model, case.free), free=case.free)
         stderr = np.array(list(result.stderr.values()))
         if not result.converged or not np.isfinite(stderr).all():
-            failures += 1
             continue
         truth = np.array([truth_of(model, name) for name in case.free])
         miss = np.array(list(result.values.values())) - truth
-        inside = (
-            np.array(case.free) != "kappa" if model is MATERIALS["vinyl"] else truth > 0
-        )
+        on_bound = (np.array(case.free) == "kappa") & (truth == 0.0)
         ends = np.array([(e.low, e.high) for e in result.estimates.values()])
-        lists["pull"].append(np.where(inside, miss / stderr, np.nan))
-        lists["covered"].append((ends[:, 0] <= truth) & (truth <= ends[:, 1]))
+        row[0] = np.where(on_bound, np.nan, miss / stderr)
+        row[1] = (ends[:, 0] <= truth) & (truth <= ends[:, 1])
         ratio = stderr / bounds[index % len(conditions)]
-        lists["ratio"].append(np.where(inside, ratio, np.nan))
-    each = (time.perf_counter() - started_at) / n_scans
-    print(
-        f"\n{case.name}: {n_scans} scans, {failures} failures, {1e3 * each:.0f} ms a scan"
-    )
-    pull, covered, ratio = (np.array(lists[key]) for key in ("pull", "covered", "ratio"))
+        row[2] = np.where(on_bound, np.nan, ratio)
+    return rows
+
+
+def report(case, rows, seconds):
+    """Print the coverage of one case over all materials and noises."""
+    failures = int(np.isnan(rows[:, 1]).any(axis=1).sum())
+    each = 1e3 * seconds / len(rows)
+    print(f"\n{case.name}: {len(rows)} scans, {failures} failures, {each:.0f} ms a scan")
+    mean, spread = np.nanmean(rows, axis=0), np.nanstd(rows, axis=0)
     for i, name in enumerate(case.free):
         print(
-            f"  {name:15s} covered {covered[:, i].mean():6.1%}   "
-            f"pull {np.nanmean(pull[:, i]):+.3f} +- {np.nanstd(pull[:, i]):.3f}   "
-            f"stderr / bound {np.nanmedian(ratio[:, i]):.3f}",
+            f"  {name:15s} covered {mean[1, i]:6.1%}   "
+            f"pull {mean[0, i]:+.3f} +- {spread[0, i]:.3f}   "
+            f"stderr / bound {np.nanmedian(rows[:, 2, i]):.3f}",
             flush=True,
         )
 
@@ -170,7 +173,9 @@ def main():
     warnings.simplefilter("error")
     for case in CASES:
         if arguments.only in case.name:
-            run(case, arguments.scans, arguments.seed)
+            start = time.perf_counter()
+            rows = collect(case, range(arguments.scans), arguments.seed)
+            report(case, rows, time.perf_counter() - start)
 
 
 if __name__ == "__main__":
