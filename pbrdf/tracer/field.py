@@ -1,16 +1,16 @@
 """A height map made ready for tracing: corner heights, block maxima, entry points."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pbrdf.kernels.heightfield import Terrain, block_maxima, steepest_slope
 from pbrdf.kernels.horizon import build_horizon
 from pbrdf.surface.heightmap import HeightMap
+from pbrdf.tracer.guard import guards, ways
 
-# A finite map keeps a rim this many height ranges wide free of entry points, at most an
-# eighth of each side, so that light leaving the interior rises above the map before its
-# edge
+# A finite map keeps at least a rim this many height ranges wide free of entry points, at
+# most an eighth of each side
 GUARD_HEIGHTS = 2.0
 GUARD_SHARE = 0.125
 # Least share of the area of a finite map that must be left for entry points
@@ -48,6 +48,9 @@ class Field:
 
     terrain: Terrain
     z_bottom: float
+    _entries: dict[tuple[float, ...], np.ndarray] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     @classmethod
     def of(cls, surface: HeightMap) -> "Field":
@@ -103,7 +106,9 @@ class Field:
 
         On a periodic surface it is the whole period. On a finite map it is where light from
         (theta_i, phi_i) [rad] (None: from any azimuth) reaches the lowest point inside the
-        map, less a guard rim, for every direction within `half_angle` [rad] of it.
+        map, for every direction within `half_angle` [rad] of it, less a guard rim: one so
+        wide that hardly any light leaves sideways, see `pbrdf.tracer.guard`, or if that
+        leaves less than a tenth of the map a narrow one.
 
         Raises
         ------
@@ -113,6 +118,15 @@ class Field:
         nx, ny = self.terrain.heights.shape
         if self.periodic:
             return np.array([0.0, 0.0, nx, ny])
+        known = (theta_i, np.inf if phi_i is None else phi_i, half_angle)
+        if known not in self._entries:
+            self._entries[known] = self._inner_rectangle(theta_i, phi_i, half_angle)
+        return self._entries[known]
+
+    def _inner_rectangle(
+        self, theta_i: float, phi_i: float | None, half_angle: float
+    ) -> np.ndarray:
+        nx, ny = self.terrain.heights.shape
         height_range = self.height_range
         sides = np.array([nx - 1.0, ny - 1.0])
         pitch = np.asarray(self.pitch)
@@ -127,11 +141,9 @@ class Field:
             drift /= pitch[:, None]
             below = np.minimum(drift.min(axis=1), 0.0)
             above = np.maximum(drift.max(axis=1), 0.0)
-        guard = np.minimum(GUARD_HEIGHTS * height_range / pitch, GUARD_SHARE * sides)
+        least = np.minimum(GUARD_HEIGHTS * height_range / pitch, GUARD_SHARE * sides)
         # The hits lie between the entry point and the entry point plus the drift
-        low = guard - below
-        high = sides - guard - above
-        lengths = high - low
+        low, lengths = least - below, sides - 2.0 * least - above + below
         if lengths.min() <= 0.0 or lengths.prod() < LEAST_INTERIOR * sides.prod():
             reach = np.tan(steepest) * height_range
             msg = (
@@ -141,4 +153,10 @@ class Field:
                 "or periodic=True."
             )
             raise ValueError(msg)
-        return np.concatenate([low, lengths])
+        narrow = np.concatenate([low, lengths])
+        for before, behind in guards(ways(self, theta_i, phi_i, narrow), least, sides):
+            low, lengths = before - below, sides - before - behind - above + below
+            if lengths.min() > 0.0 and lengths.prod() >= LEAST_INTERIOR * sides.prod():
+                return np.concatenate([low, lengths])
+        # None is wide enough: the narrow rim, and what leaves sideways is told
+        return narrow
