@@ -6,9 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from fitting.observations import Geometry, Observations
-from fitting.problem import Problem, Solved, covariance_rows
+from fitting.problem import Problem, Solved
 from fitting.result import HARDLY_APART
-from fitting.uncertainty import Information, correlation_matrix, information
+from fitting.uncertainty import (
+    Information,
+    correlation_matrix,
+    covariance_rows,
+    information,
+)
 
 __all__ = ["identifiability_warnings", "misfit_warnings"]
 

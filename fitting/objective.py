@@ -5,73 +5,24 @@ r = (prediction(x) - data) / stderr it is
 
     cost(x) = 1/2 sum rho(r^2) + 1/2 sum ((x - prior_value) / prior_stderr)^2,
 
-where rho(z) = z is least squares; other losses let outliers pull less [1]_.
-
-References
-----------
-.. [1] P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., 2009, chapter 7.
+where rho(z) = z is least squares; other losses let outliers pull less
+(`fitting.losses`).
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fitting.losses import LOSSES, loss_functions
 from fitting.parameters import Parameter
 
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["LOSSES", "Objective", "Prediction"]
-
-
-def _linear(z: Any) -> Any:
-    return z
-
-
-def _soft_l1(z: Any) -> Any:
-    import casadi
-
-    return 2.0 * (casadi.sqrt(1.0 + z) - 1.0)
-
-
-def _huber(z: Any) -> Any:
-    import casadi
-
-    # 1.345 keeps 95 % efficiency on Gaussian noise
-    bend = 1.345
-    beyond = casadi.sqrt(casadi.fmax(z, bend**2)) - bend
-    return casadi.fmin(z, bend**2) + 2.0 * bend * beyond
-
-
-def _cauchy(z: Any) -> Any:
-    import casadi
-
-    # 2.385 keeps 95 % efficiency on Gaussian noise
-    return 2.385**2 * casadi.log1p(z / 2.385**2)
-
-
-LOSSES: dict[str, Callable[[Any], Any]] = {
-    "linear": _linear,
-    "huber": _huber,
-    "soft_l1": _soft_l1,
-    "cauchy": _cauchy,
-}
-
-
-@cache
-def _loss_functions(loss: str) -> "tuple[casadi.Function, casadi.Function]":
-    """Return z -> rho(z) and r -> (psi, d psi/dr) of a loss."""
-    import casadi
-
-    z, r = casadi.SX.sym("z"), casadi.SX.sym("r")
-    psi = casadi.gradient(0.5 * LOSSES[loss](r**2), r)
-    return (
-        casadi.Function("loss", [z], [LOSSES[loss](z)]),
-        casadi.Function("influence", [r], [psi, casadi.gradient(psi, r)]),
-    )
+__all__ = ["Objective", "Prediction"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +174,7 @@ class Objective:
         """Return the cost at x; inf where the curve is not finite."""
         z = self.residuals(x) ** 2
         if self.loss != "linear":
-            z = _loss_functions(self.loss)[0](z[None, :]).full().ravel()
+            z = loss_functions(self.loss)[0](z[None, :]).full().ravel()
         penalty = [
             (v - p.prior_value) / p.prior_stderr
             for v, p in zip(x, self.parameters, strict=True)
@@ -255,7 +206,7 @@ class Objective:
 
     def influence(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return psi = r rho'(r^2) of each residual at x and its derivative, each (m,)."""
-        psi, bend = _loss_functions(self.loss)[1](self.residuals(x)[None, :])
+        psi, bend = loss_functions(self.loss)[1](self.residuals(x)[None, :])
         return psi.full().ravel(), bend.full().ravel()
 
     def sizes(self, x: np.ndarray) -> np.ndarray:

@@ -19,9 +19,9 @@ from fitting.objective import Objective, Prediction
 from fitting.observations import Observations
 from fitting.parameters import Parameter
 from fitting.solution import Solution, better
-from fitting.uncertainty import information
+from fitting.uncertainty import covariance_rows
 
-__all__ = ["SOLVERS", "Problem", "Solved", "covariance_rows", "solve_likeliest"]
+__all__ = ["SOLVERS", "Problem", "Solved", "solve_likeliest"]
 
 SOLVERS: dict[str, Callable[[Objective], Solution]] = {
     "casadi": solve_casadi,
@@ -38,8 +38,6 @@ _REFINERS: dict[str, Callable[[Objective], Solution]] = {
 _ROUNDS = 25
 # Rounds before the changes are halved
 _UNDAMPED = 4
-# Where to look at the slope of what is flat at 0
-_BESIDE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,23 +278,3 @@ def _log_likelihood(objective: Objective, x: np.ndarray) -> float:
     residual = objective.residuals(x)
     constant = np.log(objective.stderr * np.sqrt(2.0 * np.pi)).sum()
     return float(-0.5 * (residual**2).sum() - constant)
-
-
-def covariance_rows(objective: Objective, x: np.ndarray) -> np.ndarray:
-    """Return the Jacobian with the rows that the priors add, shape (m + n, n).
-
-    A parameter that acts by its square s = x^2 has no slope at 0, though its square is
-    known as well there as elsewhere. Its column is that of the square times 2 x, or times
-    the root of the square's standard error where x is less than half of that.
-    """
-    prior = np.diag([1.0 / parameter.prior_stderr for parameter in objective.parameters])
-    squared = np.array([parameter.squared for parameter in objective.parameters])
-    if not squared.any():
-        return np.vstack([objective.jacobian(x), prior])
-    point = np.where(squared, np.maximum(x, _BESIDE), x)
-    rows = np.vstack([objective.jacobian(point), prior])
-    rows[:, squared] /= 2.0 * point[squared]
-    error = information(rows).stderr[squared]
-    known = np.where(np.isfinite(error), error, 0.0)
-    rows[:, squared] *= np.maximum(2.0 * point[squared], np.sqrt(known))
-    return rows

@@ -10,11 +10,12 @@ from scipy import stats
 from fitting.forward import INSTRUMENT, Layout
 from fitting.identifiability import identifiability_warnings, misfit_warnings
 from fitting.objective import Objective
-from fitting.problem import Problem, Solved, covariance_rows
+from fitting.problem import Problem, Solved
 from fitting.result import FitResult
 from fitting.uncertainty import (
     Information,
     correlation_matrix,
+    covariance_rows,
     information,
     sandwich,
 )

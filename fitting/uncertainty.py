@@ -14,10 +14,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Information", "correlation_matrix", "information", "sandwich"]
+from fitting.objective import Objective
+
+__all__ = [
+    "Information",
+    "correlation_matrix",
+    "covariance_rows",
+    "information",
+    "sandwich",
+]
+
 
 # Columns have unit length, so this is the sine between a column and the span of the others
 _BLIND = 1e-8
+# Where to look at the slope of what is flat at 0
+_BESIDE = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,6 +107,26 @@ def information(jacobian: np.ndarray, varied: Sequence[bool] | None = None) -> I
     covariance[lost, :] = covariance[:, lost] = np.nan
     covariance[lost, lost] = np.inf
     return Information(covariance=covariance, blind=blind, length=1.0 / safe)
+
+
+def covariance_rows(objective: Objective, x: np.ndarray) -> np.ndarray:
+    """Return the Jacobian with the rows that the priors add, shape (m + n, n).
+
+    A parameter that acts by its square s = x^2 has no slope at 0, though its square is
+    known as well there as elsewhere. Its column is that of the square times 2 x, or times
+    the root of the square's standard error where x is less than half of that.
+    """
+    prior = np.diag([1.0 / parameter.prior_stderr for parameter in objective.parameters])
+    squared = np.array([parameter.squared for parameter in objective.parameters])
+    if not squared.any():
+        return np.vstack([objective.jacobian(x), prior])
+    point = np.where(squared, np.maximum(x, _BESIDE), x)
+    rows = np.vstack([objective.jacobian(point), prior])
+    rows[:, squared] /= 2.0 * point[squared]
+    error = information(rows).stderr[squared]
+    known = np.where(np.isfinite(error), error, 0.0)
+    rows[:, squared] *= np.maximum(2.0 * point[squared], np.sqrt(known))
+    return rows
 
 
 def sandwich(

@@ -8,8 +8,9 @@ from scipy import optimize
 
 from fitting.casadi_solver import solve_casadi
 from fitting.global_search import SEARCHES, starts
+from fitting.losses import LOSSES
 from fitting.nlopt_solver import solve_nlopt
-from fitting.objective import LOSSES, Objective, Prediction
+from fitting.objective import Objective, Prediction
 from fitting.parameters import Parameter, bounded_parameter
 from fitting.uncertainty import information
 
