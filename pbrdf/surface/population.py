@@ -52,6 +52,13 @@ def scatter(
     ValueError
         If a body finds no room.
     """
+    if 2 * radii.max() > min(ground.surface.size):
+        msg = (
+            f"bodies must be narrower than the surface of {min(ground.surface.size):g} um, "
+            f"got {2 * radii.max():.4g} um. Take a larger surface, or more and smaller "
+            "bodies."
+        )
+        raise ValueError(msg)
     number = len(radii)
     places, extent = np.empty((number, 2)), np.empty(number)
     span = np.asarray(ground.surface.size)
