@@ -92,25 +92,27 @@ def figure(results: dict[str, xr.Dataset], path: Path) -> None:
     sheet.savefig(path, dpi=90)
 
 
-def summary(path: Path) -> None:
-    """Print, from a table that was saved, how dew changes M10 and the polarised part."""
+def summary(path: Path, quantity: str) -> None:
+    """Print, from a table that was saved, how dew changes a quantity."""
     with path.open(encoding="utf-8") as file:
         table = list(csv.DictReader(file))
     for case in dict.fromkeys(row["case"] for row in table):
         for theta_i in dict.fromkeys(row["theta_i_deg"] for row in table):
             here = [r for r in table if (r["case"], r["theta_i_deg"]) == (case, theta_i)]
-            print(f"\n{case}, incidence {theta_i} deg: P over dry P (or P in 1e-4 / sr)")
+            print(
+                f"\n{case}, incidence {theta_i} deg: {quantity} over dry (or in 1e-4 / sr)"
+            )
             states = list(dict.fromkeys(row["state"] for row in here))
             for region in dict.fromkeys(row["region"] for row in here):
                 rows = {r["state"]: r for r in here if r["region"] == region}
-                dry = float(rows["dry"]["P"])
+                dry = float(rows["dry"][quantity])
                 cells = []
                 for state in states[1:]:
-                    value = float(rows[state]["P"])
+                    value = float(rows[state][quantity])
                     # Wet and dry share their surfaces: the error is that of the difference
-                    error = float(rows[state]["P_added_stderr"])
-                    unit = dry if dry > 0.0 else 1e-4
-                    cells.append(f"{value / unit:7.3f} ± {error / unit:.3f}")
+                    error = float(rows[state][f"{quantity}_added_stderr"])
+                    unit = dry if dry != 0.0 else 1e-4
+                    cells.append(f"{value / unit:7.3f} ± {abs(error / unit):.3f}")
                 head = " ".join(f"{state:>15}" for state in states[1:])
                 if region == "lobe":
                     print(f"{'':<11}{head}")
@@ -127,11 +129,12 @@ def main() -> None:
     parser.add_argument("--paint", choices=tuple(PAINTS), help="only this one")
     parser.add_argument("--no-volumes", action="store_true", help="contact angles only")
     parser.add_argument("--summary", action="store_true", help="of what was saved")
+    parser.add_argument("--quantity", default="P", choices=SHOWN, help="of the summary")
     options = parser.parse_args()
     if options.summary:
         for path in sorted(HERE.glob("*.csv")):
             print(f"\n== {path.name}")
-            summary(path)
+            summary(path, options.quantity)
         return
     begin = perf_counter()
     paints = [options.paint] if options.paint else list(PAINTS)
