@@ -9,6 +9,8 @@ from scipy.spatial import cKDTree
 
 # Bond numbers at which profiles are computed; between them distances are interpolated
 GRID = 0.01
+# Largest Bond number that is tried
+MAX_BOND = 20.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,18 +126,20 @@ def fit_laplace(points: np.ndarray, start: np.ndarray | None = None) -> ShapeFit
         start = np.array([centre[0], centre[1] + radius, radius, 0.1])
     scale = np.array([start[2], start[2], start[2], 1.0])
     low = np.array([-np.inf, 0.5, 2.0, 0.0])
-    high = np.array([np.inf, np.inf, np.inf, 20.0])
+    high = np.array([np.inf, np.inf, np.inf, MAX_BOND])
+    # Steps are relative: numbers near zero are moved away from it
+    shift = np.array([start[2], start[2], 0.0, 1.0])
     found = optimize.least_squares(
-        residual,
-        np.clip(start, low + 1e-6, high - 1e-6),
+        lambda q: residual(q - shift),
+        np.clip(start, low + 1e-6, high - 1e-6) + shift,
         x_scale=scale,
-        bounds=(low, high),
+        bounds=(low + shift, high + shift),
         loss="soft_l1",
         f_scale=0.5,
         max_nfev=60,
         diff_step=1e-4,
     )
-    p = found.x
+    p = found.x - shift
     x, z, _ = laplace_profile(_rounded(p[3])).T
 
     def at(parameters: np.ndarray, height: float = 0.0) -> float:
@@ -143,7 +147,9 @@ def fit_laplace(points: np.ndarray, start: np.ndarray | None = None) -> ShapeFit
         return float(np.interp((parameters[1] - height) / parameters[2], z, angle))
 
     rest = residual(p)
-    covariance = _covariance(found.jac, rest)
+    # A flat drop hardly shows its Bond number, which still is one of those tried
+    known = np.array([0.0, 0.0, 0.0, 12 / MAX_BOND**2])
+    covariance = _covariance(found.jac, rest, known)
     steps = np.array([1e-3, 0.02, 1e-3 * p[2], 2 * GRID])
     gradient = np.array(
         [
@@ -229,8 +235,13 @@ def fit_arc(points: np.ndarray) -> ShapeFit:
     )
 
 
-def _covariance(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Covariance of the parameters, for residuals that are correlated along the contour."""
+def _covariance(
+    jacobian: np.ndarray, residual: np.ndarray, known: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Covariance of the parameters, for residuals that are correlated along the contour.
+
+    `known` holds what is known of each parameter beforehand, one over its variance.
+    """
     centred = residual - residual.mean()
     spectrum = np.abs(np.fft.rfft(centred, 2 * centred.size)) ** 2
     correlation = np.fft.irfft(spectrum)[: centred.size // 4]
@@ -238,9 +249,16 @@ def _covariance(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
     negative = np.flatnonzero(correlation <= 0)
     reach = int(negative[0]) if negative.size else correlation.size
     inflation = 1 + 2 * correlation[1:reach].sum()
-    dof = max(residual.size - jacobian.shape[1], 1)
-    variance = float(np.sum(residual**2)) / dof * max(inflation, 1.0)
-    return np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-12) * variance
+    inflation = max(float(inflation), 1.0)
+    # Each parameter takes the scatter of one independent residual, not of one point
+    dof = max(residual.size - jacobian.shape[1] * inflation, residual.size / 10)
+    variance = float(np.sum(residual**2)) / dof * inflation
+    information = jacobian.T @ jacobian / variance + np.diag(
+        known * np.ones(len(jacobian.T))
+    )
+    # Lengths in pixels and plain numbers: to one scale before the inversion
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    return np.linalg.pinv(information * np.outer(scale, scale)) * np.outer(scale, scale)
 
 
 def _circle(points: np.ndarray) -> tuple[np.ndarray, float]:

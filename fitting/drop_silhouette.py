@@ -166,7 +166,7 @@ def _fit_sides(drop: DropContour, origin: np.ndarray) -> ContactAngle:
     for name, (fit, other, _) in zip(("left", "right"), results, strict=True):
         error = np.sqrt(
             fit.stderr**2
-            + ((fit.angle - other.angle) / 3) ** 2
+            + _model_variance(fit, other)
             + (fit.slope_by_height * drop.offset_stderr) ** 2
             + drop.lean_stderr**2
         )
@@ -216,6 +216,16 @@ def _fit_sides(drop: DropContour, origin: np.ndarray) -> ContactAngle:
         contour=contour,
         warnings=tuple(remarks),
     )
+
+
+def _model_variance(fit: ShapeFit, other: ShapeFit) -> float:
+    """Variance for the choice of the curve: both's difference beyond their scatter. [rad²]
+
+    A third of the difference counts as standard deviation. The arc rests on few points, so
+    most of a difference is its own scatter and says nothing about the curve that was taken.
+    """
+    scatter = fit.stderr**2 + other.stderr**2
+    return max((fit.angle - other.angle) ** 2 - scatter, 0.0) / 9
 
 
 def _fit_side(
