@@ -89,8 +89,24 @@ def solve_casadi(
 
 
 def refine_casadi(objective: Objective) -> Solution:
-    """Return the minimum next to a start that is nearly one, with little patience."""
-    return solve_casadi(objective, passes=3)
+    """Return the minimum next to a start that is nearly one, with little patience.
+
+    A proven minimum under slightly other weights: steps on the Jacobian go on to the end.
+    """
+    linear = objective.prediction.is_linear and objective.loss == "linear"
+    if linear or early_end(objective, "casadi") is not None:
+        return solve_casadi(objective)
+    x, count = descend(objective, enough=1e-15, damping=1e-6)
+    if not objective.is_at_rest(x):
+        return solve_casadi(objective.started_at(x), passes=3)
+    return Solution(
+        x=x,
+        cost=objective.cost(x),
+        converged=True,
+        status="converged",
+        solver="casadi/levenberg-marquardt",
+        n_evaluations=count,
+    )
 
 
 def _solve_ipopt(objective: Objective, max_iterations: int, passes: int) -> Solution:

@@ -15,8 +15,6 @@ from fitting.objective import Objective
 
 __all__ = ["descend"]
 
-# Fall of the cost that is no longer worth a step
-_ENOUGH = 1e-10
 # Damping beyond which no step leads down
 _STUCK = 1e8
 # Part of its size by which a parameter may change in one step
@@ -25,11 +23,29 @@ _REACH = 0.5
 _LEAST = 1e-5
 
 
-def descend(objective: Objective, *, steps: int = 40) -> tuple[np.ndarray, int]:
-    """Return a point of low cost below the start, and how often the cost was computed."""
+def descend(
+    objective: Objective,
+    *,
+    steps: int = 40,
+    enough: float = 1e-10,
+    damping: float = 1e-3,
+) -> tuple[np.ndarray, int]:
+    """Return a point of low cost below the start, and how often the cost was computed.
+
+    Parameters
+    ----------
+    objective : Objective
+        The problem.
+    steps : int
+        Limit of the steps.
+    enough : float
+        Fall of the cost, as a part of it, that is not worth another step.
+    damping : float
+        Of the first step; small where the start is nearly the minimum.
+    """
     squared = np.array([parameter.squared for parameter in objective.parameters])
     x = objective.start
-    cost, damping, count = objective.cost(x), 1e-3, 1
+    cost, count = objective.cost(x), 1
     for _ in range(steps):
         gradient, curvature, unit = _quadratic(objective, x, squared)
         pressed = ((x <= objective.low) & (gradient > 0.0)) | (
@@ -52,7 +68,7 @@ def descend(objective: Objective, *, steps: int = 40) -> tuple[np.ndarray, int]:
             break
         fall, x, cost = cost - reached, there, reached
         damping = max(0.1 * damping, 1e-12)
-        if fall <= _ENOUGH * cost:
+        if fall <= enough * cost:
             break
     return x, count
 
