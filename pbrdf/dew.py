@@ -105,7 +105,7 @@ def compare_dew(  # noqa: PLR0913  (a scene, an amount and a run)
     whole["brdf_stderr"] = _stderr(whole.brdf_runs)
     whole["brdf"] = whole.brdf_runs.mean("run")
     whole.attrs |= {"warnings": list(notes), "runs": runs, "seed": seed}
-    return whole.drop_vars("brdf_runs")
+    return whole.drop_vars(["brdf_runs", "one_path"])
 
 
 def signatures(result: xr.Dataset) -> xr.Dataset:
@@ -126,7 +126,8 @@ def signatures(result: xr.Dataset) -> xr.Dataset:
     Notes
     -----
     Errors and means are those of the jackknife over runs, which takes away the first order
-    of the bias that magnitudes and peaks of noisy values have.
+    of the bias that magnitudes and peaks of noisy values have. A region that no ray reached
+    has the error of one ray, and a DOLP of 0 ± 1.
     """
     column = result.brdf_runs.isel(stokes_in=0)
     axes = ("run", "state", "theta_i", "theta_s", "dphi", "stokes_out")
@@ -143,6 +144,14 @@ def signatures(result: xr.Dataset) -> xr.Dataset:
         return np.stack([values, values - values[:1]])
 
     value, stderr = jackknife(runs, measure)
+    # Where no ray went there is no spread, but the error of one ray
+    one = result.one_path.transpose("state", "theta_i").values[..., None]
+    floor = one / np.sum(regions * weight, axis=(-2, -1))
+    floors = np.stack([floor] * 4 + [np.ones_like(floor)] + [floor] * 2, axis=-1)
+    dark = (value[0, ..., :1] == 0.0) & (stderr[0, ..., :1] == 0.0)
+    stderr = np.where(dark, floors, stderr)
+    # What is added to the dark has the error of both
+    stderr[1, 1:] = np.where(dark[:1], np.hypot(stderr[1, 1:], floors[:1]), stderr[1, 1:])
     dims = ("state", "theta_i", "region", "quantity")
     names = ("signature", "added")
     table = {name: (dims, value[k]) for k, name in enumerate(names)}
@@ -217,6 +226,15 @@ def _over_runs(repeats: Sequence[xr.Dataset]) -> xr.Dataset:
     budget = ("absorbed", "transmitted", "truncated", "leaked")
     found = xr.Dataset({"brdf_runs": brdf, "albedo": albedo.mean("run")})
     found["albedo_stderr"] = _stderr(albedo)
+    # An empty bin of `simulate` has the error of one ray, which over all runs counts less
+    paths = [
+        (one.brdf_total_stderr[..., 0, 0] * one.projected_solid_angle)
+        .where(one.brdf_total[..., 0, 0] == 0.0)
+        .max(("theta_s", "dphi"))
+        .fillna(0.0)
+        for one in repeats
+    ]
+    found["one_path"] = xr.concat(paths, "run").mean("run") / len(repeats)
     for name in budget:
         found[name] = xr.concat([one[name] for one in repeats], "run").mean("run")
     found.attrs = repeats[0].attrs

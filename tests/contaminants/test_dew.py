@@ -52,6 +52,16 @@ def test_water_darkens_the_lobe_of_a_smooth_paint(result):
     assert (abs(sums) < 6 * np.sqrt((spread**2).sum(("theta_s", "dphi")))).all()
 
 
+def test_a_region_without_rays_has_the_error_of_one(result):
+    dark = result.isel(state=0).sel(region="wings").isel(theta_i=0)
+    assert float(dark.signature.sel(quantity="M00")) == 0.0
+    error = float(dark.signature_stderr.sel(quantity="M00"))
+    # One of 6 runs x 3000 rays, each with a reflectance of about 0.04, over the wings' area
+    area = float(result.projected_solid_angle.sum()) * np.cos(np.deg2rad(30.0)) ** 2
+    assert_allclose(error, 0.04 / 18_000 / area, rtol=0.1)
+    assert float(dark.signature_stderr.sel(quantity="DOLP")) == 1.0
+
+
 def test_jackknife_takes_the_bias_out_of_a_square():
     # Known bias: E[mean²] = μ² + σ²/n; over many samples the jackknife has none
     rng = np.random.default_rng(3)
