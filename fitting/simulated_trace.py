@@ -137,6 +137,8 @@ def trace(  # noqa: PLR0913  (what one may want to choose of a run)
                 n_dphi=n_dphi,
                 stokes=stokes,
                 wavelength=keys if len(nodes) > 1 else None,
+                # Averaged over azimuth, an isotropic surface is its own mirror image
+                fold=phi_i is None,
                 workers=workers,
             )
         runs.append(run if len(nodes) > 1 else run.expand_dims(wavelength=keys[:1]))
