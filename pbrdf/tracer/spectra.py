@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrdf.kernels import spectra as kernel
+from pbrdf.kernels.bin_fits import MAX_ORDER, choose_orders, cosine_ranges
 from pbrdf.kernels.fresnel_table import FresnelTable, build_table
 from pbrdf.kernels.shading import N_RECORD
 
@@ -16,7 +17,7 @@ BUFFER = 65536
 
 def chebyshev_points() -> tuple[np.ndarray, np.ndarray]:
     """Chebyshev points of each order, and the matrices from values there to powers."""
-    largest = kernel.MAX_ORDER
+    largest = MAX_ORDER
     points = np.zeros((largest + 1, largest))
     powers = np.zeros((largest + 1, largest, largest))
     for order in range(1, largest + 1):
@@ -33,7 +34,7 @@ NOTHING = kernel.Spectra(
     FresnelTable(
         np.empty((0, 0, 0, 0)), np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0))
     ),
-    POINTS, POWERS, np.empty((4, kernel.MAX_ORDER)),
+    POINTS, POWERS, np.empty((4, MAX_ORDER)),
 )  # fmt: skip
 
 
@@ -69,12 +70,12 @@ class Spectrum:
         """Tabulate materials (wavelengths, materials) and lay out bins of a shape."""
         table = build_table(n, kappa)
         bins, sizes = [], []
-        factors = np.empty((4, kernel.MAX_ORDER))
+        factors = np.empty((4, MAX_ORDER))
         for theta in theta_i:
             ranges = np.empty((*shape, 2))
-            kernel.cosine_ranges(theta, half_angle, ranges)
+            cosine_ranges(theta, half_angle, ranges)
             orders = np.empty(shape, dtype=np.int64)
-            kernel.choose_orders(ranges, table, POINTS, POWERS, factors, orders)
+            choose_orders(ranges, table, POINTS, POWERS, factors, orders)
             ends = n_sums * np.cumsum(orders).reshape(shape)
             layout = np.empty((*shape, kernel.N_BIN))
             layout[..., kernel.BIN_START] = ends - n_sums * orders
@@ -93,5 +94,5 @@ class Spectrum:
             np.zeros((self.table.n.shape[1], self.sizes[index])),
             np.empty((max(BUFFER, max_bounces + 2), 1, N_RECORD)),
             np.zeros(1, dtype=np.int64),
-            self.table, POINTS, POWERS, np.empty((4, kernel.MAX_ORDER)),
+            self.table, POINTS, POWERS, np.empty((4, MAX_ORDER)),
         )  # fmt: skip

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
-from pbrdf.kernels import fresnel_table, shading, spectra
+from pbrdf.kernels import bin_fits, fresnel_table, shading
 from pbrdf.kernels.fresnel import reflection_elements
 from pbrdf.tracer.skips import SKIPS
 
@@ -123,7 +123,7 @@ def test_two_bounces_in_closed_form_equal_the_product_of_matrices(n_stokes):
 def test_range_of_incidences_of_a_bin_holds_all_its_directions_and_no_more(theta_i):
     n_theta, n_dphi = 7, 10
     ranges = np.empty((n_theta, n_dphi, 2))
-    spectra.cosine_ranges(theta_i, 0.0, ranges)
+    bin_fits.cosine_ranges(theta_i, 0.0, ranges)
     share = np.linspace(0, 1, 41)
     for i in range(n_theta):
         for j in range(n_dphi):
