@@ -1,40 +1,30 @@
 """Monte Carlo prediction of the Mueller BRDF of a scene: section 3 of the paper."""
 
-import os
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterable
 from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from pbrdf.errors import AccuracyWarning, require
-from pbrdf.kernels.shading import base_strength
+from pbrdf import arguments
+from pbrdf.errors import AccuracyWarning
 from pbrdf.results import to_dataset
 from pbrdf.scene import Scene
 from pbrdf.surface import GaussianSurface, HeightMap
 from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.plan import Moments, Plan, Tally
+from pbrdf.tracer.schedule import in_order
 from pbrdf.tracer.skips import chosen_skips, explanation
 from pbrdf.tracer.trace import prepare, trace_sample
 from pbrdf.tracer.world import WetField, contaminant_materials, media_of
-from pbrdf.validity import contamination_warnings, geometric_optics_warnings
+from pbrdf.validity import contamination_warnings
 
-STOKES_COUNT = {"full": 4, "linear": 3, "unpolarized": 1}
-# A fixed surface has no realisations; its rays are dealt to this many independent batches
-BATCHES = 32
-# Below this many realisations the standard errors themselves are too uncertain
-FEW_REALIZATIONS = 8
 # Where paths are cut: on a clean surface, and where transparent bodies may catch light
 MOST_BOUNCES, MOST_EVENTS = 64, 1024
-# Half-angle of the widest source [rad]
-WIDEST_SOURCE = 0.5
-# Where a run towards a target error gives up
-MAX_SAMPLES = 4096
 
 
 def simulate(  # noqa: PLR0913  (the public signature)
@@ -138,14 +128,14 @@ def simulate(  # noqa: PLR0913  (the public signature)
     >>> round(float(result.albedo.sel(bounces="1").item()), 6)
     0.04
     """
-    fixed = not _varies(scene)
-    rays = _count("n_rays", n_rays, BATCHES)
-    drawn = _count("realizations", realizations, 1)
+    fixed = not arguments.varies(scene)
+    rays = arguments.count("n_rays", n_rays, arguments.BATCHES)
+    drawn = arguments.count("realizations", realizations, 1)
     batched = fixed or drawn == 1
-    samples = max(BATCHES, drawn) if batched else drawn
-    angles = _angles(theta_i)
-    waves = _wavelengths(wavelength)
-    n, kappa, base = _constants(scene, waves)
+    samples = max(arguments.BATCHES, drawn) if batched else drawn
+    angles = arguments.zeniths(theta_i)
+    waves = arguments.wavelengths(wavelength)
+    n, kappa, base = arguments.constants(scene, waves)
     media = None
     if scene.contaminants:
         covering = contaminant_materials(scene.contaminants)
@@ -163,23 +153,23 @@ def simulate(  # noqa: PLR0913  (the public signature)
         raise ValueError(msg)
     plan = Plan(
         theta_i=angles,
-        phi_i=_azimuth(phi_i),
+        phi_i=arguments.azimuth(phi_i),
         n_rays=-(-rays * drawn // samples) if batched else rays,
-        max_bounces=_count("max_bounces", bounces, 1),
+        max_bounces=arguments.count("max_bounces", bounces, 1),
         n=n,
         kappa=kappa,
         base=base,
-        n_stokes=_stokes_count(stokes),
-        n_theta=_count("n_theta", n_theta, 1),
-        n_dphi=_even("n_dphi", n_dphi),
+        n_stokes=arguments.stokes_count(stokes),
+        n_theta=arguments.count("n_theta", n_theta, 1),
+        n_dphi=arguments.even_count("n_dphi", n_dphi),
         skips=allowed,
         media=media,
-        half_angle=_half_angle(source_half_angle, angles, clean=media is None),
+        half_angle=arguments.half_angle(source_half_angle, angles, clean=media is None),
         fold=_mirrored(fold, scene, phi_i),
     )
-    target = None if target_rel_error is None else _target(target_rel_error)
-    _check_scene(scene)
-    notes = _warnings(scene, angles, waves, drawn)
+    target = None if target_rel_error is None else arguments.target_error(target_rel_error)
+    arguments.check_scene(scene)
+    notes = arguments.scene_warnings(scene, angles, waves, drawn)
     for note in notes:
         warnings.warn(note, AccuracyWarning, stacklevel=2)
 
@@ -188,14 +178,14 @@ def simulate(  # noqa: PLR0913  (the public signature)
     spare: deque[Tally] = deque()
     if batched:
         # The surface, or the one realisation asked for, stays the same in all batches
-        first = root.spawn(1)[0] if _varies(scene) else root
+        first = root.spawn(1)[0] if arguments.varies(scene) else root
         draw = partial(_trace_fixed, _realize(scene, plan, first), plan, spare)
     else:
         draw = partial(_trace_realization, scene, plan, spare)
 
     moments = Moments(plan)
-    limit = samples if target is None else max(samples, MAX_SAMPLES)
-    for tally in _in_order(draw, root, limit, _workers(workers)):
+    limit = samples if target is None else max(samples, arguments.MAX_SAMPLES)
+    for tally in in_order(draw, root, limit, arguments.worker_count(workers)):
         moments.add(tally)
         spare.append(tally.emptied())
         if progress is not None:
@@ -236,12 +226,6 @@ def _contamination_notes(moments: Moments, waves: np.ndarray | None) -> list[str
     for wave in () if waves is None else np.atleast_1d(waves):
         late += contamination_warnings(moments.reports, float(wave))
     return late
-
-
-def _varies(scene: Scene) -> bool:
-    """Whether realisations of the scene differ."""
-    drawn = any(getattr(one, "random", False) for one in scene.contaminants)
-    return drawn or not isinstance(scene.surface, HeightMap)
 
 
 def _realize(
@@ -288,101 +272,6 @@ def _explain(scene: Scene, plan: Plan) -> list[str]:
     return explanation(plan, periodic=sample.periodic, steepest=steepest)
 
 
-def _in_order(
-    draw: Callable[[np.random.SeedSequence], Tally],
-    root: np.random.SeedSequence,
-    samples: int,
-    workers: int,
-) -> Iterator[Tally]:
-    """Tallies of the samples in their order, computed a few ahead by threads."""
-    with ThreadPoolExecutor(workers) as pool:
-        pending: deque[Future[Tally]] = deque()
-        submitted = 0
-        try:
-            while submitted < samples or pending:
-                while submitted < samples and len(pending) < 2 * workers:
-                    pending.append(pool.submit(draw, root.spawn(1)[0]))
-                    submitted += 1
-                yield pending.popleft().result()
-        finally:
-            for future in pending:
-                future.cancel()
-
-
-def _angles(theta_i: npt.ArrayLike) -> np.ndarray:
-    angles = np.atleast_1d(
-        require(
-            "theta_i",
-            theta_i,
-            lambda v: (v >= 0) & (v < np.pi / 2),
-            "lie in [0, 1.571) rad",
-            "Angles are radians; use np.deg2rad.",
-        )
-    )
-    if angles.ndim != 1 or angles.size == 0:
-        msg = (
-            f"theta_i must be a number or one-dimensional [rad], got shape {angles.shape}."
-        )
-        raise ValueError(msg)
-    return angles
-
-
-def _wavelengths(wavelength: npt.ArrayLike | None) -> np.ndarray | None:
-    if wavelength is None:
-        return None
-    waves = require(
-        "wavelength",
-        wavelength,
-        lambda v: (v > 0) & np.isfinite(v),
-        "be positive [um]",
-        "Wavelengths are micrometres.",
-    )
-    if waves.ndim > 1 or waves.size == 0:
-        msg = (
-            f"wavelength must be a number or one-dimensional [um], got shape {waves.shape}."
-        )
-        raise ValueError(msg)
-    return waves
-
-
-def _azimuth(phi_i: float | str) -> float | None:
-    if isinstance(phi_i, str):
-        if phi_i != "uniform":
-            msg = f'phi_i must be an angle [rad] or "uniform", got {phi_i!r}.'
-            raise ValueError(msg)
-        return None
-    value = require("phi_i", phi_i, np.isfinite, "be finite [rad]", 'Or pass "uniform".')
-    if value.ndim > 0:
-        msg = f"phi_i must be one angle [rad], got shape {value.shape}. Run once for each."
-        raise ValueError(msg)
-    return float(value)
-
-
-def _half_angle(value: float, angles: np.ndarray, *, clean: bool) -> float:
-    half = float(
-        require(
-            "source_half_angle",
-            value,
-            lambda v: (v >= 0) & (v <= WIDEST_SOURCE),
-            f"lie in [0, {WIDEST_SOURCE}] rad",
-            "Angles are radians; use np.deg2rad.",
-        )
-    )
-    if half > 0.0 and angles.max() + half >= np.pi / 2:
-        msg = (
-            f"source_half_angle must leave the cone above the horizon [rad], got {half:g} "
-            f"about theta_i {angles.max():g}. Take a smaller cone or a steeper source."
-        )
-        raise ValueError(msg)
-    if half > 0.0 and not clean:
-        msg = (
-            f"source_half_angle must be 0 among contaminants [rad], got {half:g}. "
-            "Average simulations of several directions."
-        )
-        raise ValueError(msg)
-    return half
-
-
 def _mirrored(fold: bool, scene: Scene, phi_i: float | str) -> bool:
     """`fold`, if the scene is its own mirror image in the mean."""
     surface = scene.surface
@@ -401,102 +290,3 @@ def _mirrored(fold: bool, scene: Scene, phi_i: float | str) -> bool:
         )
         raise ValueError(msg)
     return fold
-
-
-def _count(name: str, value: int, least: int) -> int:
-    number = require(
-        name,
-        value,
-        lambda v: (v >= least) & (v == np.floor(v)) & (v < 2**53),
-        f"be a whole number of at least {least}",
-        "Counts are whole numbers.",
-    )
-    return int(number)
-
-
-def _even(name: str, value: int) -> int:
-    number = _count(name, value, 2)
-    if number % 2:
-        msg = f"{name} must be even, got {number}. Bins are centred on 0 and on pi."
-        raise ValueError(msg)
-    return number
-
-
-def _stokes_count(stokes: str) -> int:
-    if stokes not in STOKES_COUNT:
-        msg = f"stokes must be one of {', '.join(STOKES_COUNT)}, got {stokes!r}."
-        raise ValueError(msg)
-    return STOKES_COUNT[stokes]
-
-
-def _target(value: float) -> float:
-    return float(
-        require(
-            "target_rel_error",
-            value,
-            lambda v: (v > 0) & (v < 1),
-            "lie in (0, 1) [1]",
-            "0.01 asks for 1 %.",
-        )
-    )
-
-
-def _workers(workers: int | None) -> int:
-    if workers is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-    return _count("workers", workers, 1)
-
-
-def _constants(
-    scene: Scene, waves: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Index n, kappa and strength of the diffuse base, (wavelengths, materials)."""
-    count = 1 if waves is None or waves.ndim == 0 else waves.size
-    shape = (count, len(scene.materials))
-    n, kappa, base = np.empty(shape), np.empty(shape), np.empty(shape)
-    for column, material in enumerate(scene.materials):
-        n[:, column], kappa[:, column] = material.indices(waves)
-        albedo = material.diffuse_albedo
-        opaque = kappa[:, column].any() or not np.isfinite(n[:, column]).all()
-        if albedo > 0.0 and opaque:
-            msg = (
-                f"kappa must be 0 over a diffuse base [1], got {kappa[:, column].max():g} "
-                f"and diffuse_albedo {albedo:g}. "
-                "Light does not reach a base under an absorber."
-            )
-            raise ValueError(msg)
-        base[:, column] = [
-            base_strength(albedo, *index)
-            for index in zip(n[:, column], kappa[:, column], strict=True)
-        ]
-    return n, kappa, base if base.any() else np.empty((count, 0))
-
-
-def _check_scene(scene: Scene) -> None:
-    if isinstance(scene.surface, HeightMap) and scene.surface.missing > 0.0:
-        msg = (
-            "heights must be complete to be traced, got "
-            f"{100 * scene.surface.missing:.2g} % missing. Fill the holes with "
-            "HeightMap.filled()."
-        )
-        raise ValueError(msg)
-
-
-def _warnings(
-    scene: Scene, angles: np.ndarray, waves: np.ndarray | None, drawn: int
-) -> list[str]:
-    notes: list[str] = []
-    if _varies(scene) and drawn == 1:
-        notes.append(
-            "One realisation of a random scene: standard errors hold for this "
-            "one only. Ask for 16 realizations or more."
-        )
-    elif _varies(scene) and drawn < FEW_REALIZATIONS:
-        notes.append(
-            f"{drawn} realizations are too few for honest standard errors; "
-            "ask for 16 or more."
-        )
-    if waves is not None and not isinstance(scene.surface, HeightMap):
-        for wave in np.atleast_1d(waves):
-            notes += geometric_optics_warnings(scene.surface, angles, float(wave))
-    return notes

@@ -9,9 +9,9 @@ import numpy as np
 
 from pbrdf.conventions import BOUNCES, detector_bins
 from pbrdf.kernels import shading
+from pbrdf.kernels.events import Media
 from pbrdf.kernels.moments import add_sample, fold_mirror
 from pbrdf.kernels.spectra import N_SUMS
-from pbrdf.kernels.transparent import Media
 from pbrdf.tracer.spectra import WORTHWHILE, Spectrum
 
 

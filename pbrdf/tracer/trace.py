@@ -8,9 +8,10 @@ from pbrdf.kernels import shading
 from pbrdf.kernels.beams import N_STATE, Room
 from pbrdf.kernels.binning import bin_edges
 from pbrdf.kernels.entry import Source
+from pbrdf.kernels.events import N_HIT
 from pbrdf.kernels.horizon import NO_HORIZON
 from pbrdf.kernels.spectra import shade_gathered
-from pbrdf.kernels.transparent import N_HIT, trace_among_bodies
+from pbrdf.kernels.transparent import trace_among_bodies
 from pbrdf.kernels.transport import N_WAITING, sweep_batch, trace_batch
 from pbrdf.surface.heightmap import HeightMap
 from pbrdf.tracer.embree import EmbreeField, trace_waves

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pbrdf.kernels import bodies as bodies_kernel
-from pbrdf.kernels import transparent
+from pbrdf.kernels import events
 from pbrdf.kernels.heightfield import block_maxima
 from pbrdf.kernels.shading import base_strength
 from pbrdf.optics.materials import Material
@@ -32,7 +32,7 @@ class WetField:
     ----------
     field : Field
         The surface; its top is above everything that lies on it.
-    world : pbrdf.kernels.transparent.World
+    world : pbrdf.kernels.events.World
         Surface, bodies, film and media.
     reports : tuple of mappings
         What each contaminant became on this sample.
@@ -41,7 +41,7 @@ class WetField:
     """
 
     field: Field
-    world: transparent.World
+    world: events.World
     reports: tuple[Mapping[str, Any], ...]
     notes: tuple[str, ...]
 
@@ -51,7 +51,7 @@ class WetField:
         field: Field,
         surface: HeightMap,
         contaminants: Sequence[Any],
-        media: transparent.Media,
+        media: events.Media,
         seed: np.random.SeedSequence,
     ) -> "WetField":
         """Lay the contaminants on a surface."""
@@ -78,7 +78,7 @@ def media_of(
     substrate: Sequence[Material],
     contaminants: Sequence[Material],
     waves: np.ndarray | None,
-) -> transparent.Media:
+) -> events.Media:
     """Optical constants of air, contaminants and solids at each wavelength.
 
     Raises
@@ -118,23 +118,23 @@ def media_of(
             albedo, ratio, solid_kappa[w, column] / n[w, medium]
         )
     black = np.array([material == Material.black() for material in solids])
-    return transparent.Media(n, absorption, solid, solid_n, solid_kappa, base, black)
+    return events.Media(n, absorption, solid, solid_n, solid_kappa, base, black)
 
 
 def world_of(
-    field: Field, placement: Placement, media: transparent.Media
-) -> tuple[transparent.World, float]:
+    field: Field, placement: Placement, media: events.Media
+) -> tuple[events.World, float]:
     """Scene for the kernels, and a height above everything in it. [um]"""
     terrain = field.terrain
-    kind, height, medium = transparent.NO_FILM, 0.0, 0
+    kind, height, medium = events.NO_FILM, 0.0, 0
     top = terrain.z_top
     flipped = terrain
     if placement.film is not None:
         level, height, material = placement.film
-        kind = transparent.LEVEL if level else transparent.CONFORMAL
+        kind = events.LEVEL if level else events.CONFORMAL
         medium = 1 + material
         top = max(top, height) if level else top + height
-    if kind == transparent.CONFORMAL:
+    if kind == events.CONFORMAL:
         below = -terrain.heights
         # Of the same kind, or the kernels would be compiled once more
         below.setflags(write=terrain.heights.flags.writeable)
@@ -142,11 +142,11 @@ def world_of(
         flipped = terrain._replace(
             heights=below, maxima=maxima, levels=levels, z_top=-field.z_bottom
         )
-    film = transparent.Film(kind, float(height), medium, flipped)
+    film = events.Film(kind, float(height), medium, flipped)
     bodies = _register(placement.bodies, field)
     if len(bodies.z) > 0:
         top = max(top, bodies.z_high)
-    return transparent.World(terrain, film, bodies, media), float(top)
+    return events.World(terrain, film, bodies, media), float(top)
 
 
 def _register(bodies: Bodies, field: Field) -> bodies_kernel.Bodies:

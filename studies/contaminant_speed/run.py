@@ -14,7 +14,8 @@ from pbrdf.kernels import jit, shading
 from pbrdf.kernels.beams import KX, KY, KZ, N_STATE, Room, X, Y, Z
 from pbrdf.kernels.binning import bin_edges
 from pbrdf.kernels.entry import Source, entry_line, first_ray, wrap_into
-from pbrdf.kernels.transparent import N_HIT, follow_beam, launch_beam
+from pbrdf.kernels.events import N_HIT
+from pbrdf.kernels.transparent import follow_beam, launch_beam
 from pbrdf.surface.bodies import place
 from pbrdf.tracer.mesh import build_mesh
 from pbrdf.tracer.plan import Plan
