@@ -48,7 +48,7 @@ class IndexGrid:
     >>> polynomial = grid.coefficients @ values
     >>> index = 1.5 + 0.3j
     >>> error = grid.basis(1.5, 0.3) @ polynomial - abs((index - 1) / (index + 1)) ** 4
-    >>> abs(error) < 1e-12
+    >>> bool(abs(error) < 1e-12)
     True
     """
 
