@@ -52,8 +52,8 @@ def test_brightness_is_that_of_the_model():
 
 def test_fewer_stokes_elements_are_those_of_all():
     options = {
-        "n_rays": 1000, "realizations": 8, "source_half_angle": 0.03,
-        "detector_half_angle": 0.03,
+        "n_rays": 1000, "realizations": 8, "source_half_angle": 0.015,
+        "detector_half_angle": 0.02,
     }  # fmt: skip
     scene = Scene(SURFACE, Material(1.5, diffuse_albedo=0.5))
     full = observe(scene, 0.5, [0.55, 0.9], np.pi, **options)

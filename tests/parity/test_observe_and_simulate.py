@@ -114,7 +114,7 @@ def test_either_end_may_start_the_rays(estimator):
     scan = {"theta_i": 0.6, "theta_s": np.array([0.5, 0.8]), "dphi": np.array([2.8, 3.5])}
     there, back = (
         observe(
-            scene, **scan, phi_i=0.8, source_half_angle=0.06, detector_half_angle=0.04,
+            scene, **scan, phi_i=0.8, source_half_angle=0.05, detector_half_angle=0.04,
             n_rays=4000, realizations=48, seed=seed, start=start, estimator=estimator,
         )
         for seed, start in enumerate(["detector", "source"])
