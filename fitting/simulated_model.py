@@ -143,7 +143,16 @@ class SimulatedModel:
 
     def values(self, geometry: Geometry) -> dict[str, np.ndarray]:
         """Return every parameter at each geometry, shape (N,)."""
-        return AnalyticModel(self.model).values(geometry)
+        values = AnalyticModel(self.model).values(geometry)
+        for name, (low, high) in self.bounds.items():
+            outside = (values[name] < low - 1e-9) | (values[name] > high + 1e-9)
+            if outside.any():
+                msg = (
+                    f"index_range must hold every {name} of the scan, {low:g} .. {high:g} "
+                    f"does not hold {values[name][outside][0]:g}. Widen it."
+                )
+                raise ValueError(msg)
+        return values
 
     def mueller(
         self, values: Mapping[str, Any], geometry: Geometry, elements: Sequence[int]
@@ -187,11 +196,12 @@ class SimulatedModel:
         theta_i: np.ndarray,
         theta_s: np.ndarray,
         dphi: np.ndarray,
+        wavelength: np.ndarray | float | None = None,
         *,
         phi_i: np.ndarray | float = 0.0,
     ) -> np.ndarray:
         """Return the Mueller BRDF at directions that broadcast, (..., 4, 4). [1/sr]"""
-        geometry, shape = _flat(theta_i, theta_s, dphi, phi_i)
+        geometry, shape = _flat(theta_i, theta_s, dphi, phi_i, wavelength)
         return self._brdf(geometry).reshape(*shape, 4, 4)
 
     def stderr(
@@ -199,11 +209,12 @@ class SimulatedModel:
         theta_i: np.ndarray,
         theta_s: np.ndarray,
         dphi: np.ndarray,
+        wavelength: np.ndarray | float | None = None,
         *,
         phi_i: np.ndarray | float = 0.0,
     ) -> np.ndarray:
         """Return the standard error that the simulation leaves, (..., 4, 4). [1/sr]"""
-        geometry, shape = _flat(theta_i, theta_s, dphi, phi_i)
+        geometry, shape = _flat(theta_i, theta_s, dphi, phi_i, wavelength)
         groups = np.stack([replica._brdf(geometry) for replica in self.replicas])
         error = groups.std(axis=0, ddof=1) / np.sqrt(len(groups))
         return np.asarray(error.reshape(*shape, 4, 4))
@@ -229,17 +240,26 @@ class SimulatedModel:
 
     def _brdf(self, geometry: Geometry) -> np.ndarray:
         """Return the Mueller BRDF, shape (N, 4, 4)."""
-        where = geometry.theta_i, geometry.theta_s, geometry.dphi
         ratio, multiple = self._read(geometry)
-        n, kappa = middle_index(self.model.material)
-        gain = self.model.specular_gain
+        present = self.values(geometry)
+        terms = self._run.grid.basis(present["n"], present["kappa"])
+        several = np.einsum("nek,nk->ne", multiple, terms).reshape(-1, 4, 4)
         bare = self.model.with_parameters(
             specular_gain=1.0, diffuse_albedo=0.0, volume_albedo=0.0, grazing_albedo=0.0
         )
-        several = multiple @ self._run.grid.basis(n, kappa)
-        single = (ratio - 1.0)[:, None, None] * bare.brdf(*where, phi_i=geometry.phi_i)
-        whole = self.model.brdf(*where, phi_i=geometry.phi_i)
-        return np.asarray(whole + gain * (single + several.reshape(-1, 4, 4)))
+        wavelength = geometry.wavelength if self.model.material.dispersive else None
+        single, whole = (
+            model.brdf(
+                geometry.theta_i,
+                geometry.theta_s,
+                geometry.dphi,
+                wavelength,
+                phi_i=geometry.phi_i,
+            )
+            for model in (bare, self.model)
+        )
+        lacking = (ratio - 1.0)[:, None, None] * single + several
+        return np.asarray(whole + self.model.specular_gain * lacking)
 
     def _read(self, geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
         """Return the ratio (N,) and the coefficients (N, 16, K) at each geometry."""
@@ -260,11 +280,14 @@ class SimulatedModel:
         return ratio, multiple
 
 
-def _flat(*directions: np.ndarray | float) -> tuple[Geometry, tuple[int, ...]]:
+def _flat(
+    theta_i: np.ndarray | float,
+    theta_s: np.ndarray | float,
+    dphi: np.ndarray | float,
+    phi_i: np.ndarray | float,
+    wavelength: np.ndarray | float | None,
+) -> tuple[Geometry, tuple[int, ...]]:
     """Return directions in a row, and the shape they came in."""
-    theta_i, theta_s, dphi, phi_i = np.broadcast_arrays(
-        *(np.asarray(angle, dtype=float) for angle in directions)
-    )
-    unknown = np.full(theta_i.size, np.nan)
-    angles = theta_i.ravel(), theta_s.ravel(), dphi.ravel(), phi_i.ravel()
-    return Geometry(*angles, unknown), theta_i.shape
+    given = (theta_i, theta_s, dphi, phi_i, np.nan if wavelength is None else wavelength)
+    columns = np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in given))
+    return Geometry(*(column.ravel() for column in columns)), columns[0].shape

@@ -199,6 +199,29 @@ def test_a_slope_far_from_the_traced_one_is_named(model: SimulatedModel) -> None
     assert not model.remarks
 
 
+def test_an_index_for_each_wavelength(model: SimulatedModel) -> None:
+    table = Material.from_table(wavelength=[0.4, 0.8], n=[1.6, 1.4], kappa=[0.1, 0.3])
+    coloured = SimulatedModel(
+        Scene(SURFACE, table), n_rays=3000, realizations=32, seed=4, n_theta=30,
+        index_range=((1.3, 1.7), (0.0, 0.5)),
+    )  # fmt: skip
+    where = (THETA_I, 0.6, np.pi)
+    both = coloured.brdf(*where, np.array([0.4, 0.7]))
+    for one, (n, kappa) in zip(both, ((1.6, 0.1), (1.45, 0.25)), strict=True):
+        plain = model.updated({"n": n, "kappa": kappa}).brdf(*where)
+        # The same paths; light of one bounce was counted at another index
+        assert_allclose(one, plain, atol=0.02 * plain[0, 0])
+    with pytest.raises(ValueError, match="must hold every wavelength"):
+        coloured.brdf(*where)
+    narrow = SimulatedModel(
+        Scene(SURFACE, table), index_range=((1.45, 1.55), (0.15, 0.25))
+    )  # fmt: skip
+    with pytest.raises(
+        ValueError, match=r"hold every n of the scan, 1\.45 \.\. 1\.55 does"
+    ):
+        narrow.brdf(*where, 0.4)
+
+
 def test_merged_runs_are_their_mean_and_its_error() -> None:
     scene = Scene(SURFACE, Material(1.5))
     runs = [
