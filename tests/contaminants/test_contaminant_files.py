@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from data_io import read_result
 from pbrdf import Drops, Film, HeightMap, Material, Scene, Spheres, load_scene
+from pbrdf.cli import main
 from pbrdf.errors import DataFileError
 
 FLAT = HeightMap.flat(size=(100.0, 80.0))
@@ -99,3 +101,18 @@ def test_contaminants_must_be_a_list_of_tables(tmp_path):
     path.write_text(f'contaminants = "water"\n{HEAD}')
     with pytest.raises(DataFileError, match=r"Write \[\[contaminants\]\]"):
         load_scene(path)
+
+
+def test_the_command_simulates_what_the_file_says(tmp_path, capsys):
+    path = tmp_path / "wet.toml"
+    path.write_text(HEAD + '[[contaminants]]\ntype = "film"\nthickness_um = 4\n'
+                    'material = { n = 1.333 }\n')  # fmt: skip
+    arguments = ["--theta-i-deg", "0", "--n-rays", "1000", "--realizations", "1"]
+    assert main(["simulate", str(path), *arguments]) == 0
+    capsys.readouterr()
+    result = read_result(tmp_path / "wet.nc")
+    # Water on n = 1.5 reflects 2.37 %, dry 4 %; beams are split at random
+    error = float(np.linalg.norm(result.albedo_stderr.values))
+    assert abs(float(result.albedo.sum()) - 0.02370816) < 5 * error < 1e-3
+    assert "thickness_um = 4" in result.attrs["scene"]
+    assert "film" in result.attrs["contaminants"][0]
