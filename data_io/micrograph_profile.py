@@ -117,7 +117,7 @@ def edge_profile(
         pixels=pixels,
         blur=restored.blur * scale,
         noise_rms=restored.noise_rms * scale,
-        cutoff=restored.cutoff * scale,
+        cutoff=(restored.cutoff if restoring else 2.0) * scale,
         slope_gain=restored.slope_gain,
         tilt=-tilt if trace.upside_down else tilt,
         warnings=_remarks(trace, restored, restoring, good),

@@ -86,6 +86,10 @@ def surface_statistics(
     lengths, gives the intervals. A Gaussian autocorrelation is kept unless the data reject
     it for a Matérn form or two scales.
 
+    A profile with an attribute `cutoff` [um], such as `data_io.EdgeProfile`, has lost what
+    is shorter; the model is filtered likewise before it is compared, and a smooth form's
+    slope is that of all wavelengths. The intervals allow for it.
+
     Examples
     --------
     >>> from types import SimpleNamespace
@@ -126,7 +130,10 @@ def _profile_statistics(
         begin = np.minimum(starts, x[-1] - lags)
         return removed.along(0, begin + lags) - removed.along(0, begin)
 
-    data = AxisData(sampling, step, form_increments, degree, removed.n_terms)
+    # A restored edge ends where its noise begins, often well above the spacing
+    cutoff = float(getattr(profile, "cutoff", 0.0))
+    shortest = cutoff if cutoff > 2.1 * sampling.spacing else 0.0
+    data = AxisData(sampling, step, form_increments, degree, removed.n_terms, shortest)
     along = axis_statistics("x", data, 1.0, None)
     return assemble(
         "profile", (along,), residual, (sampling.spacing,), form=form, step=step

@@ -54,6 +54,7 @@ def axis_statistics(
         sampling.spacing,
         fit.correlation.corr_length,
     )
+    cutoff = max(cutoff, data.shortest)
     # A smooth form has a slope of its own; a jagged one only down to a wavelength
     band = cutoff if fit.correlation.form in JAGGED else 0.0
     if fit.correlation.form == "gaussian":

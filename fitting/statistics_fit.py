@@ -28,6 +28,8 @@ class AxisData:
         Of the removed form.
     n_terms : int
         Its number of coefficients.
+    shortest : float
+        Wavelength below which a filter took everything, 0 for none. [um]
     """
 
     sampling: Sampling
@@ -35,6 +37,7 @@ class AxisData:
     form_increments: Callable[[Array], Array]
     degree: int
     n_terms: int
+    shortest: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ class AxisFit:
     mean_square : float
         Of the residual heights. [um²]
     loss : float
-        Share of the height variance that form removal takes. [1]
+        Share of the height variance that form removal and a filter take. [1]
     """
 
     family: Family

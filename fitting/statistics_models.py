@@ -16,6 +16,8 @@ Array = np.ndarray
 
 SMOOTHNESS_RANGE = (0.15, 8.0)
 
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(96)
+
 
 @dataclass(frozen=True)
 class Correlation:
@@ -68,6 +70,35 @@ class Correlation:
         f = np.exp(t)
         integrand = 2 * (2 * np.pi * f) ** (2 * derivative) * self.spectrum(f) * f
         return float(integrate.simpson(integrand, x=t))
+
+    def beyond(self, wavelength: float, lags: Array) -> tuple[float, Array]:
+        r"""Shares of height variance and increments that a low-pass filter takes.
+
+        .. math:: 2 \int_{1/\lambda}^\infty S(f)\,df, \quad
+                  2 \int_{1/\lambda}^\infty S(f) (1 - \cos 2 \pi f r)\,df
+
+        Parameters
+        ----------
+        wavelength : float
+            Shortest that the filter leaves, λ. [um]
+        lags : ndarray
+            [um]
+
+        Examples
+        --------
+        A Gaussian loses erfc(π l / λ) of its variance:
+
+        >>> share, _ = gaussian(2.0).beyond(5.0, np.array([1.0]))
+        >>> bool(abs(share - special.erfc(np.pi * 2.0 / 5.0)) < 1e-9)
+        True
+        """
+        low = -np.log(wavelength)
+        high = max(np.log(200 / self.shortest_length()), low + 1)
+        t = low + (high - low) * (_NODES + 1) / 2
+        f = np.exp(t)
+        weight = (high - low) * _WEIGHTS * self.spectrum(f) * f
+        swing = 1 - np.cos(2 * np.pi * np.multiply.outer(lags, f))
+        return float(weight.sum()), swing @ weight
 
     def stretched(self, factor: float) -> "Correlation":
         """Return the same form with all lengths multiplied by `factor`."""

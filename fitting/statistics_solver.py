@@ -208,17 +208,22 @@ class _Problem:
         variance = np.exp(parameters[0])
         noise = parameters[-1] * self.mean_square
         correlation = family.build(parameters[1:-1])
-        true = 2 * variance * (1 - correlation.rho(self.found.lags)) + 2 * noise
+        drop = 1 - correlation.rho(self.found.lags)
+        if self.data.shortest:
+            drop = drop - correlation.beyond(self.data.shortest, self.found.lags)[1]
+        true = 2 * variance * drop + 2 * noise
         share = 1 - self.loss(correlation)
         left = 1 - self.data.n_terms / self.extent.n_points
         mean_square = variance * share + noise * left + self.rounding.variance
         return np.concatenate([[mean_square], self.rounding.increments(true)])
 
     def loss(self, correlation: Correlation) -> float:
-        """Share of the height variance that form removal takes, in expectation."""
+        """Share of the height variance that form and filter take, in expectation."""
         along = form_losses(correlation, self.extent.length, self.data.degree)
         if self.losses_across is None:
-            return float(min(along.sum(), 0.9))
+            short = self.data.shortest
+            filtered = correlation.beyond(short, np.zeros(1))[0] if short else 0.0
+            return float(min(along.sum() + filtered, 0.9))
         across = self.losses_across
         total = sum(along[i] * across[: along.size - i].sum() for i in range(along.size))
         return float(min(total, 0.9))

@@ -39,6 +39,24 @@ def test_spectrum_and_autocorrelation_are_a_fourier_pair(form):
     assert_allclose(form.rho(np.array(0.0)), 1.0, rtol=1e-5)
 
 
+@pytest.mark.parametrize("form", FORMS, ids=lambda f: f.form)
+def test_what_a_filter_takes_and_leaves_adds_up(form):
+    """Against the adaptive integral below the cut-off and rho itself."""
+    wavelength, lags = 1.7 * form.corr_length, np.array([0.2, 0.9]) * form.corr_length
+    share, increments = form.beyond(wavelength, lags)
+
+    def below(lag, part):
+        return 2 * integrate.quad(
+            lambda f: float(form.spectrum(np.array(f))) * part(2 * np.pi * f * lag),
+            0, 1 / wavelength, limit=500,
+        )[0]  # fmt: skip
+
+    assert share == pytest.approx(1 - below(0.0, np.cos), abs=3e-3)
+    for lag, taken in zip(lags, increments, strict=True):
+        left = below(lag, lambda phase: 1 - np.cos(phase))
+        assert taken == pytest.approx(1 - float(form.rho(lag)) - left, abs=3e-3)
+
+
 def test_matern_of_one_half_is_exponential_and_of_large_smoothness_gaussian():
     r = np.array([0.05, 0.8, 2.9, 9.0])
     assert_allclose(matern(2.9, 0.5).rho(r), np.exp(-r / 2.9), rtol=1e-10)

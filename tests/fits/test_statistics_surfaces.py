@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scipy import special
+from scipy import fft, special
 
 from fitting import surface_statistics
 
@@ -77,6 +77,27 @@ def test_truth_is_recovered_whatever_the_instrument(spacing, noise, step):
     # A height that comes out below a two-micron step leaves its slope undetermined
     ratio = scatter / np.median(errors, axis=0)
     assert (np.abs(np.log(ratio)) < 4 / np.sqrt(2 * n_real)).all()
+
+
+def test_a_known_low_pass_filter_is_made_good():
+    """As a restored edge ends where its grain begins; unsaid it costs slope."""
+    rng = np.random.default_rng(12)
+    cutoff = 1.8 * LENGTH
+    plain, told, untold = [], [], []
+    for _ in range(30):
+        z = smooth_heights(1000, 1.0, rng)
+        waves = fft.dct(z, norm="ortho")
+        waves[np.arange(z.size) > 2 * z.size / cutoff] = 0.0
+        filtered = fft.idct(waves, norm="ortho")
+        x = np.arange(z.size) * 1.0
+        plain.append(surface_statistics(profile(z)).slope_rms.value)
+        untold.append(surface_statistics(profile(filtered)).slope_rms.value)
+        known = SimpleNamespace(x=x, z=filtered, cutoff=cutoff)
+        told.append(surface_statistics(known).slope_rms.value)
+    # A Gaussian has 1.4 % of its height variance, but 11 % of its slope's below 1.8 lengths
+    assert np.mean(untold) / np.mean(plain) < 0.96
+    # 80 others gave 1.005 with a scatter of 0.06 each: 3.5 standard errors
+    assert np.mean(told) / np.mean(plain) == pytest.approx(1.0, abs=0.04)
 
 
 def test_noise_is_measured():
