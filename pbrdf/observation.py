@@ -14,29 +14,17 @@ import numpy.typing as npt
 import xarray as xr
 
 import pbrdf
+from pbrdf import arguments
 from pbrdf.analytic.geometry import flat_geometry
 from pbrdf.errors import AccuracyWarning, require
 from pbrdf.readings import Readings, as_scan, to_dataset
 from pbrdf.results import _scene_text
 from pbrdf.scene import Scene
-from pbrdf.simulation import (
-    BATCHES,
-    MAX_SAMPLES,
-    _azimuth,
-    _check_scene,
-    _constants,
-    _count,
-    _in_order,
-    _stokes_count,
-    _target,
-    _warnings,
-    _wavelengths,
-    _workers,
-)
 from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.look import Look, Sight
 from pbrdf.tracer.observer import look_at
+from pbrdf.tracer.schedule import in_order
 
 __all__ = ["ESTIMATORS", "as_scan", "observe"]
 
@@ -169,29 +157,29 @@ def observe(  # noqa: PLR0913  (the public signature)
         msg = f"theta_i, theta_s, dphi must be one-dimensional, got shape {shape}."
         raise ValueError(msg)
     surface, fixed = scene.surface, isinstance(scene.surface, HeightMap)
-    rays = _count("n_rays", n_rays, BATCHES)
-    drawn = _count("realizations", realizations, 1)
+    rays = arguments.count("n_rays", n_rays, arguments.BATCHES)
+    drawn = arguments.count("realizations", realizations, 1)
     batched = fixed or drawn == 1
-    samples = max(BATCHES, drawn) if batched else drawn
-    waves = _wavelengths(wavelength)
+    samples = max(arguments.BATCHES, drawn) if batched else drawn
+    waves = arguments.wavelengths(wavelength)
     if len(scene.contaminants) > 0:
         msg = (
             f"contaminants must be empty to observe, got {len(scene.contaminants)}. "
             "Use simulate for them."
         )
         raise ValueError(msg)
-    n, kappa, base = _constants(scene, waves)
+    n, kappa, base = arguments.constants(scene, waves)
     source = _half_angle("source_half_angle", source_half_angle, angles[0])
     detector = _half_angle("detector_half_angle", detector_half_angle, angles[1])
     look = Look(
         theta_i=angles[0],
         theta_s=angles[1],
         dphi=angles[2],
-        phi_i=_azimuth(phi_i),
+        phi_i=arguments.azimuth(phi_i),
         source=source,
         detector=detector,
         n_rays=-(-rays * drawn // samples) if batched else rays,
-        max_bounces=_count("max_bounces", max_bounces, 1),
+        max_bounces=arguments.count("max_bounces", max_bounces, 1),
         estimator=_one_of("estimator", estimator, ESTIMATORS),
         from_source=_one_of("start", start, ("detector", "source")) == "source",
         hemisphere_samples=_in_range(
@@ -203,12 +191,12 @@ def observe(  # noqa: PLR0913  (the public signature)
         n=n,
         kappa=kappa,
         base=base,
-        n_stokes=_stokes_count(stokes),
+        n_stokes=arguments.stokes_count(stokes),
     )
     _check_growth(look.hemisphere_samples, look.sample_decay)
-    target = None if target_rel_error is None else _target(target_rel_error)
-    _check_scene(scene)
-    notes = _warnings(scene, np.unique(angles[0]), waves, drawn)
+    target = None if target_rel_error is None else arguments.target_error(target_rel_error)
+    arguments.check_scene(scene)
+    notes = arguments.scene_warnings(scene, np.unique(angles[0]), waves, drawn)
     widest = max(source, detector)
     if estimator != "count" and widest > WIDE * (slope := _rms_slope(surface)) > 0.0:
         notes.append(
@@ -230,10 +218,10 @@ def observe(  # noqa: PLR0913  (the public signature)
         draw = partial(_look_at_realization, surface, look)
 
     seen = Readings(look)
-    limit = samples if target is None else max(samples, MAX_SAMPLES)
+    limit = samples if target is None else max(samples, arguments.MAX_SAMPLES)
     # The order of samples, and so the result, is the same for any number of workers
-    for sight in _in_order(draw, root, limit, _workers(workers)):  # type: ignore[arg-type]
-        seen.add(sight)  # type: ignore[arg-type]
+    for sight in in_order(draw, root, limit, arguments.worker_count(workers)):
+        seen.add(sight)
         if progress is not None:
             progress(seen.samples, samples if target is None else limit)
         enough = seen.samples >= max(samples, 2)

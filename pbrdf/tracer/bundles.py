@@ -55,7 +55,7 @@ def send_bundles(
             axis=1,
         )  # fmt: skip
         launch = surface.entry_rectangle(
-            theta + half_here, None if look.phi_i is None else azimuth
+            theta, None if look.phi_i is None else azimuth, half_here
         )
         bundle = Bundle(
             np.sin(theta), np.cos(theta), azimuth, look.phi_i is None, np.cos(half_here),
