@@ -11,7 +11,7 @@ import math
 from pbrdf.kernels import jit
 from pbrdf.kernels.binning import HALF_PI, TWO_PI
 from pbrdf.kernels.fresnel import reflection_elements
-from pbrdf.kernels.fresnel_table import TOLERANCE, table_elements
+from pbrdf.kernels.fresnel_table import TOLERANCE
 
 MIN_ORDER, MAX_ORDER = 3, 8
 
@@ -56,17 +56,14 @@ def cosine_ranges(theta_i, spread, ranges):
 
 
 @jit
-def fit_elements(mid, half, order, w, m, table, exact, points, powers, factors):
+def fit_elements(mid, half, order, n, kappa, points, powers, factors):
     """Factors of the powers of (x - mid) / half in A, B, C, D of one bin."""
     for k in range(order):
         for e in range(4):
             factors[e, k] = 0.0
     for p in range(order):
         x = min(max(mid + half * points[order, p], 0.0), 1.0)
-        if exact:
-            a, b, c, d = reflection_elements(x, table.n[w, m], table.kappa[w, m])
-        else:
-            a, b, c, d = table_elements(table, w, m, x)
+        a, b, c, d = reflection_elements(x, n, kappa)
         for k in range(order):
             share = powers[order, k, p]
             factors[0, k] += share * a
@@ -76,7 +73,7 @@ def fit_elements(mid, half, order, w, m, table, exact, points, powers, factors):
 
 
 @jit
-def fit_error(mid, half, order, w, m, table, factors):
+def fit_error(mid, half, order, n, kappa, factors):
     """Largest error of a fit as a fraction of A, where the error of a fit is largest.
 
     It swings evenly between its points, the most at the end next to grazing.
@@ -85,7 +82,7 @@ def fit_error(mid, half, order, w, m, table, factors):
     for extreme in (order, order - 1, 0):
         t = math.cos(math.pi * extreme / order)
         x = min(max(mid + half * t, 0.0), 1.0)
-        a, b, c, d = reflection_elements(x, table.n[w, m], table.kappa[w, m])
+        a, b, c, d = reflection_elements(x, n, kappa)
         fit_a = fit_b = fit_c = fit_d = 0.0
         for k in range(order - 1, -1, -1):
             fit_a = fit_a * t + factors[0, k]
@@ -114,10 +111,9 @@ def choose_orders(ranges, table, points, powers, factors, orders):
                 for m in range(table.n.shape[1]):
                     while order <= MAX_ORDER:
                         mid, half = ranges[i, j, 0], ranges[i, j, 1]
-                        fit_elements(
-                            mid, half, order, w, m, table, True, points, powers, factors
-                        )
-                        if fit_error(mid, half, order, w, m, table, factors) == 0.0:
+                        n, kappa = table.n[w, m], table.kappa[w, m]
+                        fit_elements(mid, half, order, n, kappa, points, powers, factors)
+                        if fit_error(mid, half, order, n, kappa, factors) == 0.0:
                             break
                         order += 1
             orders[i, j] = order if order <= MAX_ORDER else 0

@@ -16,7 +16,6 @@ so that the tally of one stays in the cache.
 from collections import namedtuple
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.bin_fits import fit_elements
 from pbrdf.kernels.binning import bin_of_direction
 from pbrdf.kernels.fresnel_table import table_elements
 from pbrdf.kernels.shading import (
@@ -48,8 +47,8 @@ P_END, P_BOUNCES, P_THETA, P_DPHI = 0, 1, 2, 3
 # bins (n_theta, n_dphi, N_BIN); sums (materials, size), of no size where every path is
 # shaded at once; paths, a buffer, and fill (1,), how much of it is in use; the
 # `FresnelTable`; points and powers: Chebyshev points (MAX_ORDER + 1, MAX_ORDER) and the
-# matrices from values there to the factors of the powers; room for those factors of
-# A, B, C, D
+# matrices from values there to the factors of the powers; room for elements at the
+# points
 Spectra = namedtuple("Spectra", "bins sums paths fill table points powers factors")
 
 
@@ -195,6 +194,40 @@ def shade_paths(spectra, optics, tally):
 
 
 @jit(forceinline=True)
+def sums_at_points(sums, m, at, order, n_sums, powers, room):
+    """Turn the sums over powers of a bin into the weights of its Chebyshev points.
+
+    The light of a wavelength is then the sum of its elements there times these weights.
+    """
+    for q in range(n_sums):
+        for p in range(order):
+            room[0, p] = 0.0
+            for k in range(order):
+                room[0, p] += powers[order, k, p] * sums[m, at + k * n_sums + q]
+        for p in range(order):
+            sums[m, at + p * n_sums + q] = room[0, p]
+
+
+@jit(forceinline=True)
+def is_lit(sums, m, at, order, n_sums):
+    """Whether a path reached a bin: the weights of its points add up to their number."""
+    paths = 0.0
+    for p in range(order):
+        paths += sums[m, at + p * n_sums]
+    return paths > 0.5
+
+
+@jit(forceinline=True)
+def elements_at_points(mid, half, order, w, m, table, points, elements):
+    """Elements A, B, C, D of one wavelength at the Chebyshev points of a bin."""
+    for p in range(order):
+        x = min(max(mid + half * points[order, p], 0.0), 1.0)
+        elements[0, p], elements[1, p], elements[2, p], elements[3, p] = table_elements(
+            table, w, m, x
+        )
+
+
+@jit(forceinline=True)
 def shade_bin(w, m, i_theta, i_dphi, spectra, n_stokes, tally):
     """Add the light that one bounce on one material sends into a bin."""
     bins, sums, factors, flux = spectra.bins, spectra.sums, spectra.factors, tally.flux
@@ -255,6 +288,16 @@ def shade_sums(spectra, optics, tally):
     """Shade what one bounce sent into each bin, for all wavelengths."""
     bins, sums = spectra.bins, spectra.sums
     n_theta, n_dphi = bins.shape[:2]
+    n_sums = 1 if optics.n_stokes == 1 else N_SUMS
+    for m in range(sums.shape[0]):
+        for i in range(n_theta):
+            for j in range(n_dphi):
+                at = int(bins[i, j, BIN_START])
+                order = int(bins[i, j, BIN_ORDER])
+                if order > 0 and sums[m, at] > 0.0:
+                    sums_at_points(
+                        sums, m, at, order, n_sums, spectra.powers, spectra.factors
+                    )
     for w in range(tally.energy.shape[0]):
         for m in range(sums.shape[0]):
             for i in range(n_theta):
@@ -262,12 +305,12 @@ def shade_sums(spectra, optics, tally):
                     # The bin on the other side of the plane of incidence has the same x
                     other = (n_dphi - j) % n_dphi
                     order = int(bins[i, j, BIN_ORDER])
-                    here = order > 0 and sums[m, int(bins[i, j, BIN_START])] > 0.0
-                    there = order > 0 and sums[m, int(bins[i, other, BIN_START])] > 0.0
+                    here = is_lit(sums, m, int(bins[i, j, BIN_START]), order, n_sums)
+                    there = is_lit(sums, m, int(bins[i, other, BIN_START]), order, n_sums)
                     if here or there:
-                        fit_elements(
-                            bins[i, j, BIN_MID], 1.0 / bins[i, j, BIN_SCALE], order, w, m,
-                            spectra.table, False, spectra.points, spectra.powers,
+                        elements_at_points(
+                            bins[i, j, BIN_MID], 1.0 / bins[i, j, BIN_SCALE],
+                            order, w, m, spectra.table, spectra.points,
                             spectra.factors,
                         )  # fmt: skip
                     if here:
