@@ -43,7 +43,7 @@ def spread_over_stated(scene, seeds, **options):
 def test_errors_over_realizations(estimator, albedo):
     scene = Scene(SURFACE, Material(1.5, diffuse_albedo=albedo))
     ratio = spread_over_stated(
-        scene, range(40), n_rays=1000, realizations=24, estimator=estimator,
+        scene, range(40), n_rays=4000, realizations=24, estimator=estimator,
         start="source", hemisphere_samples=1.0,
     )  # fmt: skip
     # Variance of 40 seeds, some of their 8 numbers correlated: a tenth each way
