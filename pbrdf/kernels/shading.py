@@ -250,11 +250,14 @@ def tally_path(
     for w in range(energy.shape[0]):
         path_mueller(record, ray, bounces, w, optics, n_stokes, mueller)
         energy[w, ABSORBED] -= mueller[0, 0]
+        # Loops of known length: the compiler unrolls them
         if n_stokes == 4:
             for row in range(4):
                 for column in range(4):
                     flux[w, order, i_theta, i_dphi, row, column] += mueller[row, column]
-        else:
-            for row in range(n_stokes):
-                for column in range(n_stokes):
+        elif n_stokes == 3:
+            for row in range(3):
+                for column in range(3):
                     flux[w, order, i_theta, i_dphi, row, column] += mueller[row, column]
+        else:
+            flux[w, order, i_theta, i_dphi, 0, 0] += mueller[0, 0]
