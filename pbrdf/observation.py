@@ -18,7 +18,7 @@ from pbrdf import arguments
 from pbrdf.analytic.geometry import flat_geometry
 from pbrdf.errors import AccuracyWarning, require
 from pbrdf.readings import Readings, as_scan, to_dataset
-from pbrdf.results import _scene_text
+from pbrdf.results import scene_text
 from pbrdf.scene import Scene
 from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
 from pbrdf.tracer.field import Field
@@ -249,7 +249,7 @@ def observe(  # noqa: PLR0913  (the public signature)
             "rel_error": seen.rel_error(),
             "warnings": notes,
             "version": pbrdf.__version__,
-            "scene": _scene_text(scene),
+            "scene": scene_text(scene),
         },
     )
 

@@ -84,7 +84,7 @@ def to_dataset(
 
     dataset.attrs = attrs | {
         "version": pbrdf.__version__,
-        "scene": _scene_text(scene),
+        "scene": scene_text(scene),
         "rays_per_direction": rays,
         "path_segments": int(counts[:, N_SEGMENTS].sum()),
         "rays_escaped": counts[:, N_ESCAPED].tolist(),
@@ -98,7 +98,7 @@ def to_dataset(
     return dataset
 
 
-def _scene_text(scene: Scene) -> str:
+def scene_text(scene: Scene) -> str:
     """TOML of the scene; a large map is described instead of written out."""
     try:
         return scene.to_toml()
