@@ -74,7 +74,7 @@ def azimuth(phi_i: float | str) -> float | None:
     return float(value)
 
 
-def half_angle(value: float, angles: np.ndarray, *, clean: bool) -> float:
+def half_angle(value: float, angles: np.ndarray) -> float:
     """Half-angle of the source. [rad]"""
     half = float(
         require(
@@ -89,12 +89,6 @@ def half_angle(value: float, angles: np.ndarray, *, clean: bool) -> float:
         msg = (
             f"source_half_angle must leave the cone above the horizon [rad], got {half:g} "
             f"about theta_i {angles.max():g}. Take a smaller cone or a steeper source."
-        )
-        raise ValueError(msg)
-    if half > 0.0 and not clean:
-        msg = (
-            f"source_half_angle must be 0 among contaminants [rad], got {half:g}. "
-            "Average simulations of several directions."
         )
         raise ValueError(msg)
     return half

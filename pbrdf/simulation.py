@@ -12,8 +12,8 @@ import xarray as xr
 from pbrdf import arguments
 from pbrdf.errors import AccuracyWarning
 from pbrdf.results import to_dataset
-from pbrdf.scene import Scene
-from pbrdf.surface import GaussianSurface, HeightMap
+from pbrdf.scene import Contamination, Scene, Surface
+from pbrdf.surface import HeightMap
 from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.plan import Moments, Plan, Tally
@@ -93,8 +93,9 @@ def simulate(  # noqa: PLR0913  (the public signature)
         Stokes frame stay those of its axis, the frame carried along great circles. [rad]
     fold : bool
         Average every sample with its mirror image in the plane of incidence, which halves
-        the variance. For surfaces that are their own mirror image in the mean only: an
-        isotropic GaussianSurface on a square grid with phi_i="uniform".
+        the variance. For scenes that are their own mirror image in the mean only: an
+        isotropic random surface on a square grid or a flat one, drops and spheres drawn
+        anew for every realisation, and phi_i="uniform".
 
     Returns
     -------
@@ -164,7 +165,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
         n_dphi=arguments.even_count("n_dphi", n_dphi),
         skips=allowed,
         media=media,
-        half_angle=arguments.half_angle(source_half_angle, angles, clean=media is None),
+        half_angle=arguments.half_angle(source_half_angle, angles),
         fold=_mirrored(fold, scene, phi_i),
     )
     target = None if target_rel_error is None else arguments.target_error(target_rel_error)
@@ -274,19 +275,32 @@ def _explain(scene: Scene, plan: Plan) -> list[str]:
 
 def _mirrored(fold: bool, scene: Scene, phi_i: float | str) -> bool:
     """`fold`, if the scene is its own mirror image in the mean."""
-    surface = scene.surface
     symmetric = (
-        isinstance(surface, GaussianSurface)
-        and np.unique(surface.corr_length).size == 1
-        and np.unique(surface.spacing).size == 1
-        and not scene.contaminants
-        and isinstance(phi_i, str)
+        isinstance(phi_i, str)
+        and _isotropic(scene.surface)
+        and not any(_pinned(one) for one in scene.contaminants)
     )
     if fold and not symmetric:
         msg = (
             "fold must be left out where the mean is not its own mirror image, got a "
-            f"{type(surface).__name__} and phi_i {phi_i!r}. It takes a clean isotropic "
-            'GaussianSurface with dx = dy, and phi_i="uniform".'
+            f"{type(scene.surface).__name__}, {len(scene.contaminants)} contaminants and "
+            f"phi_i {phi_i!r}. It takes an isotropic random surface with dx = dy or a flat "
+            'one, bodies drawn anew for every realisation, and phi_i="uniform".'
         )
         raise ValueError(msg)
     return fold
+
+
+def _pinned(contaminant: Contamination) -> bool:
+    """Whether bodies lie at the same places in every realisation."""
+    return any(
+        getattr(contaminant, name, None) is not None for name in ("positions", "seed")
+    )
+
+
+def _isotropic(surface: Surface) -> bool:
+    """Whether a surface is its own mirror image in the mean over azimuth."""
+    if isinstance(surface, HeightMap):
+        return surface.labels is None and not np.ptp(surface.heights)
+    # The diagonal of a cell is its own image where both steps are the same
+    return len({*np.ravel(surface.corr_length)}) == len({*np.ravel(surface.spacing)}) == 1

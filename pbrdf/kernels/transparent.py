@@ -31,7 +31,7 @@ from pbrdf.kernels.beams import (
 )
 from pbrdf.kernels.binning import bin_of_direction
 from pbrdf.kernels.bodies import HIT_T
-from pbrdf.kernels.entry import entry_line, first_ray, wrap_into
+from pbrdf.kernels.entry import entry_line, first_ray, line_beam, wrap_into
 from pbrdf.kernels.events import (
     ASIDE,
     ASTRAY,
@@ -81,7 +81,7 @@ CROWDED = -9
 
 
 @jit(forceinline=True)
-def meet_interface(world, w, state, top, kind, hit, columns, draw):
+def meet_interface(world, w, state, top, kind, hit, columns, stream, number, event):
     """Reflect and refract at the surface of a transparent body; returns the new top.
 
     Within one medium nothing happens. CROWDED says that the beam is in too many bodies.
@@ -110,7 +110,10 @@ def meet_interface(world, w, state, top, kind, hit, columns, draw):
     refracted = a_t * i + b_t * q
     both = min(reflected, refracted) >= SPLIT
     share = reflected / (reflected + refracted)
-    keeps = draw < share
+    keeps = False
+    if not both:
+        draw, _ = uniform_pair(stream, number, event)
+        keeps = draw < share
     if both or not keeps:
         # The refracted part, on the far side
         further = top + 1 if both else top
@@ -131,7 +134,9 @@ def meet_interface(world, w, state, top, kind, hit, columns, draw):
 
 
 @jit(forceinline=True)
-def meet_solid(world, w, state, top, kind, hit, columns, draw_a, draw_b, energy):
+def meet_solid(
+    world, w, state, top, kind, hit, columns, stream, number, event, energy
+):  # fmt: skip
     """Reflect at something opaque and scatter at the base under it; returns the new top."""
     media = world.media
     if kind == GROUND:
@@ -154,6 +159,7 @@ def meet_solid(world, w, state, top, kind, hit, columns, draw_a, draw_b, energy)
     base = media.base[w, solid, medium]
     scattered = 0.0
     if base > 0.0:
+        draw_a, draw_b = uniform_pair(stream, number, event)
         copy_beam(state, top, top + 1)
         a_in, b_in, _, _ = transmission_elements(cos_in, n, kappa)
         cos_out = scatter_about(state, top + 1, n_x, n_y, n_z, draw_a, draw_b)
@@ -223,18 +229,20 @@ def end_beam(state, top, kind, columns, w, cos_phi_i, sin_phi_i, tally):
 
 
 @jit(allocates=False)
-def launch_beam(state, x, y, z, source, cos_phi, sin_phi, columns):
-    """Start a beam of unit matrix in the air, against dir_i."""
+def launch_beam(state, x, y, z, beam, columns):
+    """Start a beam of unit matrix in the air, of the light that `line_beam` tells."""
+    _, _, sin_t, cos_t, cos_b, sin_b, s_x, s_y, s_z = beam
     for column in range(N_STATE):
         state[0, column] = 0.0
     state[0, X] = x
     state[0, Y] = y
     state[0, Z] = z
-    state[0, KX] = -source.sin_theta * cos_phi
-    state[0, KY] = -source.sin_theta * sin_phi
-    state[0, KZ] = -source.cos_theta
-    state[0, SX] = sin_phi
-    state[0, SY] = -cos_phi
+    state[0, KX] = -sin_t * cos_b
+    state[0, KY] = -sin_t * sin_b
+    state[0, KZ] = -cos_t
+    state[0, SX] = s_x
+    state[0, SY] = s_y
+    state[0, SZ] = s_z
     state[0, FACET] = -1.0
     state[0, LEFT] = NOTHING
     for row in range(columns):
@@ -252,11 +260,12 @@ def absorb_on_the_way(world, w, state, top, columns, distance, energy):
 
 
 @jit(forceinline=True)
-def survives(state, top, columns, draw):
+def survives(state, top, columns, stream, number, event):
     """Whether a beam goes on; a weak one by chance, at the strength of the threshold."""
     strength = state[top, MUELLER]
     if strength >= WEAK:
         return True
+    _, draw = uniform_pair(stream, number, event)
     if draw * WEAK >= strength:
         return False
     scale_columns(state, top, columns, WEAK / strength)
@@ -277,23 +286,23 @@ def follow_beam(
         return top - 1
 
     move_beam(world, state, top, kind, hit)
-    draw_a, draw_b = uniform_pair(stream, number, 2 * step)
     opaque = kind == GROUND
     if kind == BODY_IN:
         opaque = world.media.solid[w, world.bodies.medium[int(hit[HIT_BODY])]] >= 0
     if opaque:
         new = meet_solid(
-            world, w, state, top, kind, hit, columns, draw_a, draw_b, tally.energy
-        )
+            world, w, state, top, kind, hit, columns, stream, number, 2 * step,
+            tally.energy,
+        )  # fmt: skip
     else:
-        new = meet_interface(world, w, state, top, kind, hit, columns, draw_a)
+        new = meet_interface(
+            world, w, state, top, kind, hit, columns, stream, number, 2 * step
+        )
         if new == CROWDED:
             end_beam(state, top, ASTRAY, columns, w, cos_phi, sin_phi, tally)
             return top - 1
-    if new >= 0:
-        _, chance = uniform_pair(stream, number, 2 * step + 1)
-        if not survives(state, new, columns, chance):
-            return new - 1
+    if new >= 0 and not survives(state, new, columns, stream, number, 2 * step + 1):
+        return new - 1
     return new
 
 
@@ -328,6 +337,7 @@ def trace_among_bodies(world, source, z_start, max_events, columns, room, tally)
         start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = (
             entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
         )
+        beam = line_beam(line, source)
         first = first_ray(line, source)
         rays = first_ray(line + 1, source) - first
         for ray in range(rays):
@@ -337,7 +347,7 @@ def trace_among_bodies(world, source, z_start, max_events, columns, room, tally)
             for w in range(tally.energy.shape[0]):
                 launch_beam(
                     room.state, x * terrain.pitch_x, y * terrain.pitch_y, z_start,
-                    source, cos_phi, sin_phi, columns,
+                    beam, columns,
                 )  # fmt: skip
                 trace_beams(
                     world, w, first + ray, source, cos_phi, sin_phi, max_events,

@@ -13,7 +13,7 @@ import pbrdf
 from pbrdf.kernels import jit, shading
 from pbrdf.kernels.beams import KX, KY, KZ, N_STATE, Room, X, Y, Z
 from pbrdf.kernels.binning import bin_edges
-from pbrdf.kernels.entry import Source, entry_line, first_ray, wrap_into
+from pbrdf.kernels.entry import Source, entry_line, first_ray, line_beam, wrap_into
 from pbrdf.kernels.events import N_HIT
 from pbrdf.kernels.transparent import follow_beam, launch_beam
 from pbrdf.surface.bodies import place
@@ -40,13 +40,14 @@ def record_segments(world, source, z_start, room, tally, segments):
         start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = (
             entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
         )
+        beam = line_beam(line, source)
         first = first_ray(line, source)
         rays = first_ray(line + 1, source) - first
         for ray in range(rays):
             s = length * ((ray + offset) / rays)
             x = wrap_into(start_x + speed_x * s, launch[0], launch[2]) * terrain.pitch_x
             y = wrap_into(start_y + speed_y * s, launch[1], launch[3]) * terrain.pitch_y
-            launch_beam(room.state, x, y, z_start, source, cos_phi, sin_phi, 4)
+            launch_beam(room.state, x, y, z_start, beam, 4)
             top = 0
             step = 0
             while top >= 0 and count < segments.shape[0]:

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
-from pbrdf.conventions import detector_bins
+from tests.source_disc import assert_answers_disc, disc, mirrored_disc
 
 ALUMINIUM = Material(0.958, 6.69)
 FLAT = HeightMap.flat(size=(2.0, 3.0))
@@ -13,53 +13,6 @@ ROUGH = GaussianSurface(shape=(96, 80), spacing=1.0, corr_length=8.0, slope_rms=
     2
 )
 SOURCE = np.deg2rad(40.0)
-
-
-def disc(theta, phi, half, count):
-    """Directions of a disc of uniform radiance by flux, drawn by rejection from its cap."""
-    rng = np.random.default_rng(5)
-    axis = np.array(
-        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
-    )
-    across = np.array([-np.sin(phi), np.cos(phi), 0.0])
-    along = np.cross(across, axis)
-    cosine = rng.uniform(np.cos(half), 1.0, 4 * count)
-    turn = rng.uniform(0.0, 2.0 * np.pi, 4 * count)
-    sine = np.sqrt(1.0 - cosine**2)
-    found = (
-        cosine[:, None] * axis
-        + (sine * np.cos(turn))[:, None] * along
-        + (sine * np.sin(turn))[:, None] * across
-    )
-    return found[rng.random(4 * count) < found[:, 2]][:count], axis
-
-
-def turn_between(old, new, beam):
-    """Mueller rotations of beams from s axis `old` to `new`."""
-    cos = (old * new).sum(-1)
-    sin = (np.cross(beam, old) * new).sum(-1)
-    turn = np.zeros((*cos.shape, 4, 4))
-    turn[..., 0, 0] = turn[..., 3, 3] = 1.0
-    turn[..., 1, 1] = turn[..., 2, 2] = cos**2 - sin**2
-    turn[..., 1, 2] = 2 * cos * sin
-    turn[..., 2, 1] = -2 * cos * sin
-    return turn
-
-
-def unit(vectors):
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
-def carried(axis, s, to):
-    """Vector s across `axis`, turned with it along the great circle to each of `to`."""
-    hinge = unit(np.cross(axis, to))
-    angle = np.arccos(np.clip(to @ axis, -1.0, 1.0))[:, None]
-    # Rodrigues' rotation about the hinge
-    return (
-        s * np.cos(angle)
-        + np.cross(hinge, s) * np.sin(angle)
-        + hinge * (hinge @ s)[:, None] * (1.0 - np.cos(angle))
-    )
 
 
 @pytest.mark.parametrize("skips", [True, ("walk",), False])
@@ -71,44 +24,23 @@ def test_flat_metal_mirrors_the_disc_with_its_frames(theta, phi, skips):
         Scene(FLAT, ALUMINIUM), theta, phi_i=phi, n_rays=120_000, source_half_angle=half,
         n_theta=n_theta, n_dphi=n_dphi, skips=skips,
     )  # fmt: skip
-    to_source, axis = disc(theta, phi, half, 400_000)
-    beam = -to_source
-    out = beam * [1.0, 1.0, -1.0]
-    across = unit(np.cross(beam, [0.0, 0.0, 1.0]))
-    start = carried(-axis, np.array([np.sin(phi), -np.cos(phi), 0.0]), beam)
-    meridian = unit(np.cross([0.0, 0.0, 1.0], out))
     index = 0.958 + 6.69j
-    cosine = to_source[:, 2]
-    q = np.sqrt(index**2 - 1 + cosine**2)
-    r_s, r_p = (
-        (cosine - q) / (cosine + q),
-        (index**2 * cosine - q) / (index**2 * cosine + q),
-    )
-    facet = np.zeros((len(out), 4, 4))
-    facet[:, 0, 0] = facet[:, 1, 1] = (abs(r_s) ** 2 + abs(r_p) ** 2) / 2
-    facet[:, 0, 1] = facet[:, 1, 0] = (abs(r_s) ** 2 - abs(r_p) ** 2) / 2
-    facet[:, 2, 2] = facet[:, 3, 3] = (r_s * r_p.conj()).real
-    facet[:, 2, 3] = -(r_s * r_p.conj()).imag
-    facet[:, 3, 2] = (r_s * r_p.conj()).imag
-    mueller = (
-        turn_between(across, meridian, out) @ facet @ turn_between(start, across, beam)
-    )
-    i = np.minimum((np.arccos(out[:, 2]) / (np.pi / 2) * n_theta).astype(int), n_theta - 1)
-    dphi = np.arctan2(out[:, 1], out[:, 0]) - phi
-    j = np.floor(dphi / (2 * np.pi) * n_dphi + 0.5).astype(int) % n_dphi
-    expected = np.zeros((n_theta, n_dphi, 4, 4))
-    np.add.at(expected, (i, j), mueller / len(out))
-    weight = detector_bins(n_theta, n_dphi)[2][..., None, None]
-    flux, stated = (
-        result[name].values[0] * weight for name in ("brdf_total", "brdf_total_stderr")
-    )
-    error = np.hypot(stated, np.sqrt(expected[..., :1, :1] / len(out)))
-    lit = expected[..., :1, :1] > 1e-3
-    z = np.abs(flux - expected) / error * lit
-    assert z.max() < 6.0, z.max()
-    assert np.abs(flux - expected)[~lit[..., 0, 0]].max() < 2e-3
+
+    def facet(cosine):
+        q = np.sqrt(index**2 - 1 + cosine**2)
+        r_s = (cosine - q) / (cosine + q)
+        r_p = (index**2 * cosine - q) / (index**2 * cosine + q)
+        matrix = np.zeros((len(cosine), 4, 4))
+        matrix[:, 0, 0] = matrix[:, 1, 1] = (abs(r_s) ** 2 + abs(r_p) ** 2) / 2
+        matrix[:, 0, 1] = matrix[:, 1, 0] = (abs(r_s) ** 2 - abs(r_p) ** 2) / 2
+        matrix[:, 2, 2] = matrix[:, 3, 3] = (r_s * r_p.conj()).real
+        matrix[:, 2, 3] = -(r_s * r_p.conj()).imag
+        matrix[:, 3, 2] = (r_s * r_p.conj()).imag
+        return matrix
+
+    expected, drawn = mirrored_disc(theta, phi, half, facet, n_theta, n_dphi)
     assert np.abs(expected[..., 1:, 1:]).max() > 0.02
-    assert_allclose(flux[..., 0, 0].sum(), expected[..., 0, 0].sum(), rtol=2e-3)
+    assert_answers_disc(result, expected, drawn)
 
 
 def test_rough_surface_answers_a_disc_as_the_mean_of_its_directions():
