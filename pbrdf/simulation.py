@@ -145,11 +145,10 @@ def simulate(  # noqa: PLR0913  (the public signature)
     if bounces is None:
         bounces = MOST_BOUNCES if media is None else MOST_EVENTS
     allowed = chosen_skips(skips)
-    if (base.shape[1] > 0 or media is not None) and "walk" not in allowed:
-        where = "over a diffuse base" if media is None else "among contaminants"
+    if media is not None and "walk" not in allowed:
         msg = (
-            f'skips must hold "walk" {where}, got {sorted(allowed)}. '
-            "The Embree route traces clean opaque Fresnel surfaces only."
+            f'skips must hold "walk" among contaminants, got {sorted(allowed)}. '
+            "The Embree route traces clean surfaces only."
         )
         raise ValueError(msg)
     plan = Plan(

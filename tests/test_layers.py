@@ -20,6 +20,7 @@ KERNEL_IMPORTS = {
     "hashlib",
     "math",
     "numba",
+    "llvmlite",  # the code generator of numba
     "numpy",
     "os",
     "pathlib",

@@ -9,6 +9,7 @@ the record up to its own hit.
 import math
 
 from pbrdf.kernels import jit
+from pbrdf.kernels.embree import SELF, seek
 from pbrdf.kernels.entry import TWO_PI, entry_line, first_ray, line_beam, wrap_into
 from pbrdf.kernels.frames import PARALLEL, turn_frame
 from pbrdf.kernels.heightfield import (
@@ -33,6 +34,7 @@ from pbrdf.kernels.shading import (
     N_ESCAPED,
     N_LEAKED,
     N_SEGMENTS,
+    N_SELF,
     N_SIDE,
     N_TRUNCATED,
     SPECULAR,
@@ -161,14 +163,35 @@ def scatter(slope_x, slope_y, draw_a, draw_b):
 
 
 @jit(forceinline=True)
+def next_facet(terrain, tree, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate):
+    """Follow a ray from a facet to the next: by the walk, or with a tree by Embree."""
+    if tree is None:
+        return leave_facet(
+            terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate, MAX_STEPS
+        )
+    return seek(terrain, tree, i, j, facet, u, v, z, k_x, k_y, k_z)
+
+
+@jit(forceinline=True)
+def first_facet(terrain, tree, i, j, u, v, k_x, k_y, k_z):
+    """Follow a ray from the top plane to the first facet it meets."""
+    if tree is None:
+        return walk(
+            terrain, i, j, -1, u, v, terrain.z_top, k_x / terrain.pitch_x,
+            k_y / terrain.pitch_y, k_z, 0.0, MAX_STEPS,
+        )  # fmt: skip
+    return seek(terrain, tree, i, j, -1, u, v, terrain.z_top, k_x, k_y, k_z)
+
+
+@jit(forceinline=True)
 def trace_ray(
-    terrain, fate, i, j, facet, u, v, z, beam, stream, number,
+    terrain, tree, fate, i, j, facet, u, v, z, beam, stream, number,
     record, waiting, spectra, optics, tally,
 ):  # fmt: skip
     """Follow a ray from its first meeting with the surface until all its light has left.
 
     `fate` says what became of it so far: HIT on the facet given, or what `walk` returned;
-    `beam` is the light of its line as `line_beam` tells.
+    `beam` is the light of its line as `line_beam` tells; `tree` as in `trace_batch`.
     """
     cos_phi, sin_phi, sin_t, cos_t, cos_b, sin_b, s_x, s_y, s_z = beam
     labels = terrain.labels
@@ -224,8 +247,8 @@ def trace_ray(
             record[bounces, 0, LABEL] = labels[i, j] if labels.size > 0 else 0
             bounces += 1
             tally.counts[N_SEGMENTS] += 1
-            fate, i, j, facet, u, v, z = leave_facet(
-                terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate, MAX_STEPS
+            fate, i, j, facet, u, v, z = next_facet(
+                terrain, tree, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate
             )
 
         c2, s2 = 1.0, 0.0
@@ -240,6 +263,8 @@ def trace_ray(
             end = N_SIDE
         elif fate == ESCAPED and bounces > 0:
             end = N_ESCAPED
+        elif fate == SELF:
+            tally.counts[N_SELF] += 1
         if gathers:
             gather_path(
                 end, record, 0, bounces, k_x, k_y, k_z, cos_phi, sin_phi,
@@ -264,19 +289,20 @@ def trace_ray(
         record[bounces, 0, COS_OUT] = waiting[n_waiting, W_COS]
         bounces += 1
         tally.counts[N_SEGMENTS] += 1
-        fate, i, j, facet, u, v, z = leave_facet(
-            terrain, int(waiting[n_waiting, W_I]), int(waiting[n_waiting, W_J]),
+        fate, i, j, facet, u, v, z = next_facet(
+            terrain, tree, int(waiting[n_waiting, W_I]), int(waiting[n_waiting, W_J]),
             int(waiting[n_waiting, W_FACET]), waiting[n_waiting, W_U],
             waiting[n_waiting, W_V], waiting[n_waiting, W_Z],
-            k_x, k_y, k_z, waiting[n_waiting, W_RATE], MAX_STEPS,
+            k_x, k_y, k_z, waiting[n_waiting, W_RATE],
         )  # fmt: skip
 
 
 @jit(allocates=False)
-def trace_batch(terrain, source, record, waiting, spectra, optics, tally):
+def trace_batch(terrain, tree, source, record, waiting, spectra, optics, tally):
     """Trace rays of one incident direction and add their Mueller matrices to the tally.
 
-    Every ray walks from its entry point in the top plane; see `sweep_batch`. `record`
+    Every ray is followed from its entry point in the top plane; see `sweep_batch`. It
+    walks, or with a `pbrdf.kernels.embree.Tree` asks Embree for each facet. `record`
     (bounces + 1, 1, N_RECORD) and `waiting` (bounces, N_WAITING) are room to work in. With
     `Spectra` of some size the light is gathered there, to be shaded afterwards.
     """
@@ -295,13 +321,11 @@ def trace_batch(terrain, source, record, waiting, spectra, optics, tally):
             y = wrap_into(start_y + speed_y * s, launch[1], launch[3])
             i = min(int(x), terrain.heights.shape[0] - 1)
             j = min(int(y), terrain.heights.shape[1] - 1)
-            fate, i, j, facet, u, v, z = walk(
-                terrain, i, j, -1, x - i, y - j, terrain.z_top,
-                -sin_t * cos_b / terrain.pitch_x, -sin_t * sin_b / terrain.pitch_y,
-                -cos_t, 0.0, MAX_STEPS,
-            )  # fmt: skip
+            fate, i, j, facet, u, v, z = first_facet(
+                terrain, tree, i, j, x - i, y - j, -sin_t * cos_b, -sin_t * sin_b, -cos_t
+            )
             trace_ray(
-                terrain, fate, i, j, facet, u, v, z, beam, source.stream, first + ray,
+                terrain, tree, fate, i, j, facet, u, v, z, beam, source.stream, first + ray,
                 record, waiting, spectra, optics, tally,
             )  # fmt: skip
 
@@ -372,7 +396,7 @@ def sweep_batch(terrain, source, record, waiting, spectra, optics, tally):
                         if lag_b > lag_a:
                             share = min(max((lag - lag_a) / (lag_b - lag_a), 0.0), 1.0)
                         trace_ray(
-                            terrain, HIT, i, j, facet, u_a + share * (u_b - u_a),
+                            terrain, None, HIT, i, j, facet, u_a + share * (u_b - u_a),
                             v_a + share * (v_b - v_a), z_a + share * (z_b - z_a),
                             beam, source.stream, first + ray,
                             record, waiting, spectra, optics, tally,

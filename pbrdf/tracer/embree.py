@@ -1,17 +1,117 @@
-"""Embree as the intersector: batches of rays in spatial order over a triangle mesh."""
+"""Embree as the intersector, through the library that embreex brings along.
 
+embreex itself takes whole arrays of rays; a compiled kernel calls `rtcIntersect1` ray by
+ray instead, without a pass over memory before and after.
+"""
+
+import ctypes
+import functools
+import importlib.metadata
+import weakref
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from pbrdf.kernels import shading, wavefront
-from pbrdf.kernels.entry import Source
+from pbrdf.kernels.embree import N_WORDS, Tree
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.mesh import Mesh, build_mesh
 
-# Rays traced together; their state stays in the cache of one core
-CHUNK = 16_384
+# Numbers of Embree's C interface, the same in every version 4
+EMBREE = 4
+PROPERTY_VERSION = 0
+GEOMETRY_TRIANGLES = 0
+BUFFER_INDEX, BUFFER_VERTEX = 0, 1
+FORMAT_UINT3, FORMAT_FLOAT3 = 0x5003, 0x9003
+SCENE_ROBUST = 1 << 2
+ALIGNMENT = 64
+
+_HANDLE = ctypes.c_void_p
+_NUMBER = ctypes.c_uint
+_SIGNATURES = {
+    "rtcNewDevice": (_HANDLE, [ctypes.c_char_p]),
+    "rtcGetDeviceProperty": (ctypes.c_ssize_t, [_HANDLE, _NUMBER]),
+    "rtcGetDeviceError": (_NUMBER, [_HANDLE]),
+    "rtcNewScene": (_HANDLE, [_HANDLE]),
+    "rtcSetSceneFlags": (None, [_HANDLE, _NUMBER]),
+    "rtcNewGeometry": (_HANDLE, [_HANDLE, _NUMBER]),
+    "rtcSetSharedGeometryBuffer": (
+        None,
+        [_HANDLE, _NUMBER, _NUMBER, _NUMBER, _HANDLE, *[ctypes.c_size_t] * 3],
+    ),
+    "rtcCommitGeometry": (None, [_HANDLE]),
+    "rtcAttachGeometry": (_NUMBER, [_HANDLE, _HANDLE]),
+    "rtcReleaseGeometry": (None, [_HANDLE]),
+    "rtcCommitScene": (None, [_HANDLE]),
+    "rtcReleaseScene": (None, [_HANDLE]),
+}
+
+
+@functools.cache
+def library() -> ctypes.CDLL:
+    """Embree's C library out of the package embreex.
+
+    Raises
+    ------
+    RuntimeError
+        If the package has none, or one of another version than 4.
+    """
+    for file in importlib.metadata.files("embreex") or []:
+        if "embree4" in file.name:
+            found = ctypes.CDLL(str(file.locate()))
+            break
+    else:
+        msg = (
+            "The Embree route needs the library embree4 out of the package embreex, and "
+            f"embreex {importlib.metadata.version('embreex')} holds none. Install the "
+            'version in the lock file, or leave the skip "walk" on.'
+        )
+        raise RuntimeError(msg)
+    for name, (result, arguments) in _SIGNATURES.items():
+        function = getattr(found, name)
+        function.restype, function.argtypes = result, arguments
+    return found
+
+
+@functools.cache
+def device() -> int:
+    """Embree's device, one for the whole program."""
+    made: int = library().rtcNewDevice(None)
+    version = library().rtcGetDeviceProperty(made, PROPERTY_VERSION)
+    if version // 10_000 != EMBREE:
+        msg = f"The Embree route needs Embree {EMBREE}, got version number {version}."
+        raise RuntimeError(msg)
+    return made
+
+
+def build_tree(mesh: Mesh) -> int:
+    """Embree's scene of a mesh, whose arrays must outlive it.
+
+    Raises
+    ------
+    RuntimeError
+        If Embree reports an error, for one too little memory.
+    """
+    embree = library()
+    scene: int = embree.rtcNewScene(device())
+    embree.rtcSetSceneFlags(scene, SCENE_ROBUST)
+    geometry = embree.rtcNewGeometry(device(), GEOMETRY_TRIANGLES)
+    for kind, form, array in (
+        (BUFFER_VERTEX, FORMAT_FLOAT3, mesh.vertices),
+        (BUFFER_INDEX, FORMAT_UINT3, mesh.faces),
+    ):
+        embree.rtcSetSharedGeometryBuffer(
+            geometry, kind, 0, form, array.ctypes.data, 0, array.strides[0], len(array)
+        )
+    embree.rtcCommitGeometry(geometry)
+    embree.rtcAttachGeometry(scene, geometry)
+    embree.rtcReleaseGeometry(geometry)
+    embree.rtcCommitScene(scene)
+    error = embree.rtcGetDeviceError(device())
+    if error:
+        embree.rtcReleaseScene(scene)
+        msg = f"Embree built no tree over {len(mesh.faces)} faces: error {error}."
+        raise RuntimeError(msg)
+    return scene
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -20,50 +120,22 @@ class EmbreeField:
 
     field: Field
     mesh: Mesh
-    scene: Any
+    scene: int
 
     @classmethod
     def of(cls, field: Field) -> "EmbreeField":
         """Build the mesh and the tree."""
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
         mesh = build_mesh(field)
-        scene = EmbreeScene(robust=True)
-        TriangleMesh(scene, mesh.vertices, mesh.faces)
-        # The first query commits the scene; later ones may then run in parallel
-        down = np.array([[0.0, 0.0, -1.0]], dtype=np.float32)
-        scene.run(-down, down, output=True)
-        return cls(field=field, mesh=mesh, scene=scene)
+        made = cls(field=field, mesh=mesh, scene=build_tree(mesh))
+        weakref.finalize(made, library().rtcReleaseScene, made.scene)
+        return made
 
-    def first_faces(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Find the first face met by each ray (rays, 3), -1 for none."""
-        faces: np.ndarray = self.scene.run(origins, directions, output=True)["primID"]
-        return faces
-
-
-def trace_waves(
-    target: EmbreeField,
-    source: Source,
-    max_bounces: int,
-    optics: shading.Optics,
-    tally: shading.Tally,
-) -> None:
-    """Trace one incident direction in chunks of rays, and add to the tally."""
-    terrain, frame = target.field.terrain, target.mesh.frame
-    size = min(CHUNK, source.n_rays)
-    state = np.empty((size, wavefront.N_STATE))
-    cell = np.empty((size, wavefront.N_CELL), dtype=np.int64)
-    record = np.empty((max_bounces + 1, size, shading.N_RECORD))
-    for first in range(0, source.n_rays, size):
-        active = np.empty(min(size, source.n_rays - first), dtype=np.int64)
-        wavefront.enter_rays(terrain, source, first, state, cell, active)
-        while active.size:
-            origins = np.empty((active.size, 3), dtype=np.float32)
-            directions = np.empty((active.size, 3), dtype=np.float32)
-            wavefront.emit_rays(terrain, frame, state, cell, active, origins, directions)
-            faces = target.first_faces(origins, directions)
-            kept = wavefront.advance_rays(
-                terrain, frame, faces, state, cell, active, record, optics, tally
-            )
-            active = active[:kept]
+    def tree(self) -> Tree:
+        """Give the tree, and room for one ray: each thread takes one of its own."""
+        room = np.zeros(4 * N_WORDS + ALIGNMENT, dtype=np.uint8)
+        start = -room.ctypes.data % ALIGNMENT
+        ray = room[start : start + 4 * N_WORDS].view(np.float32)
+        call = ctypes.cast(library().rtcIntersect1, ctypes.c_void_p).value
+        return Tree(
+            call, self.scene, ray.ctypes.data, ray, ray.view(np.uint32), self.mesh.frame
+        )

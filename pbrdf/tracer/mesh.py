@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbrdf.kernels.wavefront import MeshFrame
+from pbrdf.kernels.embree import MeshFrame
 from pbrdf.tracer.field import Field
 
 # The mesh of a periodic surface goes on this many height ranges beyond the period
@@ -65,7 +65,8 @@ def build_mesh(field: Field) -> Mesh:
         vertices=vertices.reshape(-1, 3),
         faces=np.stack([low, high], axis=2).reshape(-1, 3),
         frame=MeshFrame(
-            *center, unit, max(1e-4, 32.0 * float(np.spacing(np.float32(largest)))),
-            *guard, field.z_bottom,
+            *center, field.pitch[0] / unit, field.pitch[1] / unit, 1.0 / unit,
+            max(1e-4, 32.0 * float(np.spacing(np.float32(largest)))),
+            *guard, rows.size - 1, 1.0 / (rows.size - 1), field.z_bottom,
         ),
     )  # fmt: skip

@@ -14,7 +14,7 @@ from pbrdf.kernels.spectra import shade_gathered
 from pbrdf.kernels.transparent import trace_among_bodies
 from pbrdf.kernels.transport import N_WAITING, sweep_batch, trace_batch
 from pbrdf.surface.heightmap import HeightMap
-from pbrdf.tracer.embree import EmbreeField, trace_waves
+from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.plan import Plan, Tally
 from pbrdf.tracer.spectra import NOTHING
@@ -70,9 +70,6 @@ def trace_sample(
             zenith, azimuth, tally.flux[index], tally.energy[index], tally.counts[index],
             np.zeros((4, 4)),
         )  # fmt: skip
-        if isinstance(target, EmbreeField):
-            trace_waves(target, source, plan.max_bounces, optics, bins)
-            continue
         if isinstance(target, WetField):
             places = Room(np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT))
             trace_among_bodies(
@@ -82,10 +79,12 @@ def trace_sample(
             continue
         shared = plan.spectrum
         light = shared.room(index, plan.max_bounces) if shared else NOTHING
-        # One pass along each line of entry points finds all first facets
-        sweeps = field.periodic and "sweep" in plan.skips
-        batch = sweep_batch if sweeps else trace_batch
-        batch(field.terrain, source, record, waiting, light, optics, bins)
+        if isinstance(target, Field) and field.periodic and "sweep" in plan.skips:
+            # One pass along each line of entry points finds all first facets
+            sweep_batch(field.terrain, source, record, waiting, light, optics, bins)
+        else:
+            tree = None if isinstance(target, Field) else target.tree()
+            trace_batch(field.terrain, tree, source, record, waiting, light, optics, bins)
         if shared:
             shade_gathered(plan.n_rays, light, optics, bins)
     return tally

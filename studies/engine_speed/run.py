@@ -8,11 +8,10 @@ import time
 import warnings
 
 import numpy as np
-from embreex.rtcore_scene import EmbreeScene  # noqa: F401  (loaded before any clock starts)
+from embree_replay import Replay
 from plain import simulate_plainly
 
 import pbrdf
-from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.plan import Plan
 from pbrdf.tracer.skips import SKIPS
 from pbrdf.tracer.trace import prepare, trace_sample
@@ -50,28 +49,28 @@ def seconds(work, repeats=3, clock=time.process_time):
     return best
 
 
+def in_turn(*works, repeats=5):
+    """Processor time of each work: the median of runs taken in turn after a first."""
+    spent = [[] for _ in works]
+    for _ in range(repeats + 1):
+        for work, times in zip(works, spent, strict=True):
+            start = time.process_time()
+            work()
+            times.append(time.process_time() - start)
+    return [float(np.median(times[1:])) for times in spent]
+
+
 def against_embree(n_rays):
     """Path segments through Embree: the engine against a replay of the very same rays."""
     target = prepare(surface(SLOPE).sample(3), frozenset())
-    batches = []
-    plain_run = EmbreeField.first_faces
-
-    def remember(self, origins, directions):
-        batches.append((origins.copy(), directions.copy()))
-        return plain_run(self, origins, directions)
-
     work = plan(n_rays, skips=frozenset())
-    EmbreeField.first_faces = remember
-    trace_sample(target, work, np.random.SeedSequence(1))
-    EmbreeField.first_faces = plain_run
-    engine = seconds(lambda: trace_sample(target, work, np.random.SeedSequence(1)))
 
-    def replay():
-        for origins, directions in batches:
-            target.scene.run(origins, directions, output=True)
+    def trace(field):
+        trace_sample(field, work, np.random.SeedSequence(1))
 
-    raw = seconds(replay)
-    segments = sum(len(origins) for origins, _ in batches)
+    replay = Replay.of(target, trace, 4 * n_rays)
+    engine, raw = in_turn(lambda: trace(target), replay.run)
+    segments = replay.segments
     print(
         f"  segments through Embree      {segments / engine / 1e6:6.2f} M per core-second"
     )
