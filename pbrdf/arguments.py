@@ -74,6 +74,17 @@ def azimuth(phi_i: float | str) -> float | None:
     return float(value)
 
 
+def azimuths(phi_i: npt.ArrayLike | str) -> tuple[list[float | None], bool]:
+    """Azimuths of the source [rad], None for any, and whether they are a dimension."""
+    if isinstance(phi_i, str) or np.ndim(phi_i) == 0:
+        return [azimuth(phi_i)], False  # type: ignore[arg-type]
+    listed = np.asarray(phi_i)
+    if listed.ndim > 1 or listed.size == 0:
+        msg = f"phi_i must be a number or one-dimensional [rad], got shape {listed.shape}."
+        raise ValueError(msg)
+    return [azimuth(one) for one in listed], True
+
+
 def half_angle(value: float, angles: np.ndarray) -> float:
     """Half-angle of the source. [rad]"""
     half = float(

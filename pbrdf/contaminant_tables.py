@@ -1,6 +1,7 @@
 """Contaminants in TOML files: degrees, micrometres, drops per square millimetre."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +105,35 @@ def read_contaminant(table: Mapping[str, Any], source: Path) -> Drops | Spheres 
     except (TypeError, ValueError) as error:
         problem = f"[{PLACE} {kind}]: {str(error).rstrip('.')}"
         raise DataFileError(source, problem, "See the documented keys.") from error
+
+
+def with_value(
+    contaminants: Sequence[Drops | Spheres | Film], key: str, value: float
+) -> tuple[Drops | Spheres | Film, ...]:
+    """Return the contaminants with another value, in the unit of the file.
+
+    Raises
+    ------
+    ValueError
+        Unless exactly one of them has a number under this key.
+    """
+    found = []
+    for number, one in enumerate(contaminants):
+        kind = next(name for name, cls in KINDS.items() if isinstance(one, cls))
+        name, unit = _KEYS[kind].get(key, ("", 1.0))
+        if name and np.ndim(getattr(one, name)) == 0 and getattr(one, name) is not None:
+            found.append((number, name, unit))
+    if len(found) != 1:
+        msg = (
+            f"{key} must be given by one contaminant of the scene to be varied, got "
+            f"{len(found)} that have it. Vary another key, or write one scene file each."
+        )
+        raise ValueError(msg)
+    number, name, unit = found[0]
+    listed = list(contaminants)
+    change: dict[str, Any] = {name: value * unit}
+    listed[number] = replace(listed[number], **change)
+    return tuple(listed)
 
 
 def _in_file(value: Any, unit: float) -> Any:

@@ -17,7 +17,7 @@ class Variable(NamedTuple):
     dims: tuple[str, ...]
 
 
-_LIGHT = ("theta_i", "wavelength")
+_LIGHT = ("theta_i", "phi_i", "wavelength")
 _BOUNCES = ("bounces", *_LIGHT)
 _BINS = ("theta_s", "dphi")
 _MUELLER = (*_BINS, "stokes_out", "stokes_in")
@@ -54,9 +54,11 @@ RESULT_VARIABLES: dict[str, Variable] = {
         _LIGHT,
     ),
     "side_exits": Variable(
-        "1", "share of the rays that left a finite map sideways, not counted", ("theta_i",)
+        "1", "share of the rays that left a finite map sideways, not counted",
+        ("theta_i", "phi_i"),
     ),
     "theta_i": Variable("rad", "zenith angle of the source", ("theta_i",)),
+    "phi_i": Variable("rad", "azimuth of the source", ("phi_i",)),
     "theta_s": Variable("rad", "zenith of the detector, bin centre", ("theta_s",)),
     "dphi": Variable("rad", "azimuth from source to detector, bin centre", ("dphi",)),
     "wavelength": Variable("um", "vacuum wavelength", ("wavelength",)),

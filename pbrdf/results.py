@@ -1,5 +1,6 @@
 """Result datasets: labelled axes, units from one table, the scene as attributes."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -26,13 +27,70 @@ from pbrdf.tracer.plan import Moments
 
 
 def to_dataset(
-    moments: Moments, scene: Scene, *, wavelength: np.ndarray | None, attrs: dict[str, Any]
+    moments: Sequence[Moments],
+    scene: Scene,
+    *,
+    several: bool,
+    wavelength: np.ndarray | None,
+    attrs: dict[str, Any],
 ) -> xr.Dataset:
-    """Normalise tallies to a Mueller BRDF and label every axis."""
+    """Normalise the tallies of each azimuth to a Mueller BRDF and label every axis.
+
+    Counts in the attributes are sums over azimuths; with `several` of them the dimension
+    `phi_i` follows theta_i.
+    """
+    plan = moments[0].plan
+    theta_s, dphi, _ = detector_bins(plan.n_theta, plan.n_dphi)
+    spectral = wavelength is not None and wavelength.ndim == 1
+    coords: dict[str, Any] = {
+        "bounces": list(BOUNCES),
+        "theta_i": plan.theta_i,
+        "theta_s": theta_s,
+        "dphi": dphi,
+        "stokes_out": list(STOKES[: plan.n_stokes]),
+        "stokes_in": list(STOKES[: plan.n_stokes]),
+    }
+    if several:
+        coords["phi_i"] = [one.plan.phi_i for one in moments]
+    if wavelength is not None:
+        coords["wavelength"] = wavelength if spectral else float(wavelength)
+
+    layers = [_estimates(one) for one in moments]
+    data: dict[str, Any] = {}
+    for name, array in layers[0].items():
+        dims = tuple(d for d in RESULT_VARIABLES[name].dims if several or d != "phi_i")
+        if "phi_i" in dims:
+            array = np.stack([one[name] for one in layers], dims.index("phi_i"))
+        if "wavelength" in dims and not spectral:
+            array = array.squeeze(dims.index("wavelength"))
+            dims = tuple(d for d in dims if d != "wavelength")
+        data[name] = (dims, array)
+    dataset = xr.Dataset(data, coords)
+    for variable in dataset.variables:
+        entry = RESULT_VARIABLES[str(variable)]
+        dataset[variable].attrs = {"units": entry.units, "long_name": entry.long_name}
+
+    counts = np.sum([one.counts for one in moments], axis=0)
+    dataset.attrs = attrs | {
+        "version": pbrdf.__version__,
+        "scene": scene_text(scene),
+        "rays_per_direction": plan.n_rays * moments[0].samples,
+        "path_segments": int(counts[:, N_SEGMENTS].sum()),
+        "rays_escaped": counts[:, N_ESCAPED].tolist(),
+        "rays_truncated": counts[:, N_TRUNCATED].tolist(),
+        "rays_leaked": counts[:, N_LEAKED].tolist(),
+        "rays_left_sideways": counts[:, N_SIDE].tolist(),
+        "self_hits": int(counts[:, N_SELF].sum()),
+        "medium_mismatches": int(counts[:, N_MISMATCH].sum()),
+        "rel_error": max(one.rel_error() for one in moments),
+    }
+    return dataset
+
+
+def _estimates(moments: Moments) -> dict[str, np.ndarray]:
+    """Estimates of one azimuth, with the dimensions of the table but phi_i."""
     plan = moments.plan
-    theta_s, dphi, weight = detector_bins(plan.n_theta, plan.n_dphi)
-    counts = moments.counts
-    rays = plan.n_rays * moments.samples
+    _, _, weight = detector_bins(plan.n_theta, plan.n_dphi)
     per_weight = 1.0 / weight[:, :, None, None]
 
     def by_bounces(flux: np.ndarray) -> np.ndarray:
@@ -43,7 +101,7 @@ def to_dataset(
     total, total_stderr = moments.flux_total()
     albedo, albedo_stderr = moments.albedo()
     energy = moments.energy()
-    arrays = {
+    return {
         "brdf": by_bounces(mean),
         "brdf_stderr": by_bounces(stderr),
         "brdf_total": total * per_weight,
@@ -56,46 +114,8 @@ def to_dataset(
         "truncated": energy[..., TRUNCATED],
         "leaked": energy[..., LEAKED],
         "left_sideways": energy[..., SIDEWAYS],
-        "side_exits": counts[:, N_SIDE] / rays,
+        "side_exits": moments.counts[:, N_SIDE] / (plan.n_rays * moments.samples),
     }
-    coords: dict[str, Any] = {
-        "bounces": list(BOUNCES),
-        "theta_i": plan.theta_i,
-        "theta_s": theta_s,
-        "dphi": dphi,
-        "stokes_out": list(STOKES[: plan.n_stokes]),
-        "stokes_in": list(STOKES[: plan.n_stokes]),
-    }
-    spectral = wavelength is not None and wavelength.ndim == 1
-    if wavelength is not None:
-        coords["wavelength"] = wavelength if spectral else float(wavelength)
-
-    data: dict[str, Any] = {}
-    for name, array in arrays.items():
-        dims = RESULT_VARIABLES[name].dims
-        if "wavelength" in dims and not spectral:
-            array = array.squeeze(dims.index("wavelength"))
-            dims = tuple(d for d in dims if d != "wavelength")
-        data[name] = (dims, array)
-    dataset = xr.Dataset(data, coords)
-    for variable in dataset.variables:
-        entry = RESULT_VARIABLES[str(variable)]
-        dataset[variable].attrs = {"units": entry.units, "long_name": entry.long_name}
-
-    dataset.attrs = attrs | {
-        "version": pbrdf.__version__,
-        "scene": scene_text(scene),
-        "rays_per_direction": rays,
-        "path_segments": int(counts[:, N_SEGMENTS].sum()),
-        "rays_escaped": counts[:, N_ESCAPED].tolist(),
-        "rays_truncated": counts[:, N_TRUNCATED].tolist(),
-        "rays_leaked": counts[:, N_LEAKED].tolist(),
-        "rays_left_sideways": counts[:, N_SIDE].tolist(),
-        "self_hits": int(counts[:, N_SELF].sum()),
-        "medium_mismatches": int(counts[:, N_MISMATCH].sum()),
-        "rel_error": moments.rel_error(),
-    }
-    return dataset
 
 
 def scene_text(scene: Scene) -> str:

@@ -2,7 +2,7 @@
 
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 import numpy as np
@@ -31,7 +31,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
     scene: Scene,
     theta_i: npt.ArrayLike,
     *,
-    phi_i: float | str = 0.0,
+    phi_i: npt.ArrayLike | str = 0.0,
     n_rays: int = 100_000,
     realizations: int = 1,
     seed: int | None = 0,
@@ -56,9 +56,10 @@ def simulate(  # noqa: PLR0913  (the public signature)
         Surface and substrate.
     theta_i : array_like, shape () or (angles,)
         Zenith angle of the source, in [0, π/2). [rad]
-    phi_i : float or "uniform"
-        Azimuth of the source [rad]; "uniform" averages over it, as suits an isotropic
-        surface.
+    phi_i : float, array_like of shape (azimuths,), or "uniform"
+        Azimuth of the source; several add the dimension `phi_i` and share surfaces and
+        entry points, so each gives what it would give alone. "uniform" averages over the
+        azimuth, as suits an isotropic surface. [rad]
     n_rays : int
         Rays an incident direction and realisation.
     realizations : int
@@ -100,9 +101,9 @@ def simulate(  # noqa: PLR0913  (the public signature)
     Returns
     -------
     xarray.Dataset
-        `brdf` [sr^-1] and `brdf_stderr` (bounces, theta_i, [wavelength], theta_s, dphi,
-        stokes_out, stokes_in), `brdf_total` for all bounces, `albedo`, the energy budget
-        and `projected_solid_angle`; see `pbrdf.conventions.RESULT_VARIABLES`.
+        `brdf` [sr^-1] and `brdf_stderr` (bounces, theta_i, [phi_i], [wavelength], theta_s,
+        dphi, stokes_out, stokes_in), `brdf_total` for all bounces, `albedo`, the energy
+        budget and `projected_solid_angle`; see `pbrdf.conventions.RESULT_VARIABLES`.
 
     Raises
     ------
@@ -135,6 +136,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
     batched = fixed or drawn == 1
     samples = max(arguments.BATCHES, drawn) if batched else drawn
     angles = arguments.zeniths(theta_i)
+    azimuths, several = arguments.azimuths(phi_i)
     waves = arguments.wavelengths(wavelength)
     n, kappa, base = arguments.constants(scene, waves)
     media = None
@@ -153,7 +155,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
         raise ValueError(msg)
     plan = Plan(
         theta_i=angles,
-        phi_i=arguments.azimuth(phi_i),
+        phi_i=azimuths[0],
         n_rays=-(-rays * drawn // samples) if batched else rays,
         max_bounces=arguments.count("max_bounces", bounces, 1),
         n=n,
@@ -167,6 +169,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
         half_angle=arguments.half_angle(source_half_angle, angles),
         fold=_mirrored(fold, scene, phi_i),
     )
+    plans = [plan.at(azimuth) for azimuth in azimuths]
     target = None if target_rel_error is None else arguments.target_error(target_rel_error)
     arguments.check_scene(scene)
     notes = arguments.scene_warnings(scene, angles, waves, drawn)
@@ -179,45 +182,67 @@ def simulate(  # noqa: PLR0913  (the public signature)
     if batched:
         # The surface, or the one realisation asked for, stays the same in all batches
         first = root.spawn(1)[0] if arguments.varies(scene) else root
-        draw = partial(_trace_fixed, _realize(scene, plan, first), plan, spare)
+        draw = partial(_trace_fixed, _realize(scene, plan, first), plans, spare)
     else:
-        draw = partial(_trace_realization, scene, plan, spare)
+        draw = partial(_trace_realization, scene, plans, spare)
 
-    moments = Moments(plan)
     limit = samples if target is None else max(samples, arguments.MAX_SAMPLES)
-    for tally in in_order(draw, root, limit, arguments.worker_count(workers)):
-        moments.add(tally)
-        spare.append(tally.emptied())
-        if progress is not None:
-            progress(moments.samples, samples if target is None else limit)
-        enough = moments.samples >= max(samples, 2)
-        if target is not None and enough and moments.rel_error() <= target:
-            break
-    for note in (late := _contamination_notes(moments, waves)):
+    moments = _gathered(
+        plans, in_order(draw, root, limit, arguments.worker_count(workers)), spare,
+        least=max(samples, 2), limit=limit, target=target, progress=progress,
+    )  # fmt: skip
+    done = moments[0].samples
+    for note in (late := _contamination_notes(moments[0], waves)):
         warnings.warn(note, AccuracyWarning, stacklevel=2)
     notes += late
     return to_dataset(
         moments,
         scene,
+        several=several,
         wavelength=waves,
         attrs={
             "seed": int(root.entropy),  # type: ignore[arg-type]
             "n_rays": rays,
-            "realizations": 1 if batched else moments.samples,
-            "ray_batches": moments.samples if batched else 0,
+            "realizations": 1 if batched else done,
+            "ray_batches": done if batched else 0,
             "stderr_excludes_surface": batched,
             "max_bounces": plan.max_bounces,
             "stokes": stokes,
-            "phi_i": "uniform" if plan.phi_i is None else plan.phi_i,
+            "phi_i": phi_i if isinstance(phi_i, str) else np.asarray(phi_i, float).tolist(),
             "source_half_angle": plan.half_angle,
             "folded": plan.fold,
             "target_rel_error": np.nan if target is None else target,
             "intersector": "height-field walk" if "walk" in allowed else "embree",
             "explanation": _explain(scene, plan) if explain else [],
-            "contaminants": [str(dict(report)) for report in moments.reports],
+            "contaminants": [str(dict(report)) for report in moments[0].reports],
             "warnings": notes,
         },
     )
+
+
+def _gathered(
+    plans: Sequence[Plan],
+    drawn: Iterable[Sequence[Tally]],
+    spare: deque[Tally],
+    *,
+    least: int,
+    limit: int,
+    target: float | None,
+    progress: Callable[[int, int], None] | None,
+) -> list[Moments]:
+    """Moments of each azimuth over samples, from `least` on only up to the target error."""
+    moments = [Moments(plan) for plan in plans]
+    for done, tallies in enumerate(drawn, start=1):
+        for one, tally in zip(moments, tallies, strict=True):
+            one.add(tally)
+            spare.append(tally.emptied())
+        if progress is not None:
+            progress(done, limit)
+        if target is None or done < least:
+            continue
+        if max(one.rel_error() for one in moments) <= target:
+            break
+    return moments
 
 
 def _contamination_notes(moments: Moments, waves: np.ndarray | None) -> list[str]:
@@ -251,18 +276,19 @@ def _taken(spare: deque[Tally]) -> Tally | None:
 
 def _trace_fixed(
     target: Field | EmbreeField | WetField,
-    plan: Plan,
+    plans: Sequence[Plan],
     spare: deque[Tally],
     seed: np.random.SeedSequence,
-) -> Tally:
-    return trace_sample(target, plan, seed, _taken(spare))
+) -> list[Tally]:
+    """One sample of every azimuth: the same surface, streams and entry points."""
+    return [trace_sample(target, plan, seed, _taken(spare)) for plan in plans]
 
 
 def _trace_realization(
-    scene: Scene, plan: Plan, spare: deque[Tally], seed: np.random.SeedSequence
-) -> Tally:
+    scene: Scene, plans: Sequence[Plan], spare: deque[Tally], seed: np.random.SeedSequence
+) -> list[Tally]:
     heights, rays = seed.spawn(2)
-    return trace_sample(_realize(scene, plan, heights), plan, rays, _taken(spare))
+    return _trace_fixed(_realize(scene, plans[0], heights), plans, spare, rays)
 
 
 def _explain(scene: Scene, plan: Plan) -> list[str]:
@@ -272,7 +298,7 @@ def _explain(scene: Scene, plan: Plan) -> list[str]:
     return explanation(plan, periodic=sample.periodic, steepest=steepest)
 
 
-def _mirrored(fold: bool, scene: Scene, phi_i: float | str) -> bool:
+def _mirrored(fold: bool, scene: Scene, phi_i: npt.ArrayLike | str) -> bool:
     """`fold`, if the scene is its own mirror image in the mean."""
     symmetric = (
         isinstance(phi_i, str)

@@ -1,5 +1,6 @@
 """Options that several commands share, each written once."""
 
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -7,7 +8,9 @@ from typing import Annotated
 import typer
 
 __all__ = [
+    "Azimuths",
     "Blocked",
+    "Fold",
     "Force",
     "FormOption",
     "Free",
@@ -21,12 +24,15 @@ __all__ = [
     "Scan",
     "Seed",
     "Shadowing",
+    "SourceHalfAngle",
     "Spacing",
     "Surface",
     "UmPerPixel",
     "Unit",
     "Wavelength",
+    "Wavelengths",
     "Workers",
+    "azimuths",
     "form",
     "names",
     "numbers",
@@ -129,6 +135,28 @@ Workers = Annotated[
 Incidences = Annotated[
     str, typer.Option("--theta-i-deg", help="Zenith angles of the source, by commas.")
 ]
+Azimuths = Annotated[
+    str,
+    typer.Option(
+        "--phi-i-deg", help="Azimuths of the source by commas, or uniform for the average."
+    ),
+]
+SourceHalfAngle = Annotated[
+    float,
+    typer.Option(
+        "--source-half-angle-deg", min=0.0, max=28.0, help="Half-angle of the source."
+    ),
+]
+Fold = Annotated[
+    bool,
+    typer.Option(
+        "--fold", help="Average with the mirror image, for isotropic random scenes."
+    ),
+]
+Wavelengths = Annotated[
+    str | None,
+    typer.Option("--wavelength-um", help="Wavelengths, for a material given as a table."),
+]
 Target = Annotated[
     float | None,
     typer.Option("--target-rel-error", min=1e-6, max=0.999, help="Go on to this error."),
@@ -169,6 +197,14 @@ def numbers(text: str, option: str) -> list[float]:
             msg = f"{option} must be numbers separated by commas, got {word!r} in {text!r}."
             raise ValueError(msg) from None
     return found
+
+
+def azimuths(text: str) -> "str | float | list[float]":
+    """Return "uniform", one azimuth, or a list of several. [rad]"""
+    if text.strip() == "uniform":
+        return "uniform"
+    found = [math.radians(value) for value in numbers(text, "--phi-i-deg")]
+    return found[0] if len(found) == 1 else found
 
 
 def form(text: str) -> str | int:

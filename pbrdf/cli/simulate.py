@@ -16,36 +16,16 @@ if TYPE_CHECKING:
 def simulate(
     scene: Annotated[Path, typer.Argument(help="Scene file (TOML).", show_default=False)],
     theta_i: options.Incidences = "30",
-    phi_i: Annotated[
-        str,
-        typer.Option(
-            "--phi-i-deg", help="Azimuth of the source, or uniform for its average."
-        ),
-    ] = "0",
-    source_half_angle: Annotated[
-        float,
-        typer.Option(
-            "--source-half-angle-deg", min=0.0, max=28.0, help="Half-angle of the source."
-        ),
-    ] = 0.0,
-    fold: Annotated[
-        bool,
-        typer.Option(
-            "--fold", help="Average with the mirror image, for isotropic random surfaces."
-        ),
-    ] = False,
+    phi_i: options.Azimuths = "0",
+    source_half_angle: options.SourceHalfAngle = 0.0,
+    fold: options.Fold = False,
     output: options.Output = None,
     force: options.Force = False,
     n_rays: options.Rays = 100_000,
     realizations: options.Realizations = 16,
     target: options.Target = None,
     max_bounces: options.Bounces = None,
-    wavelength: Annotated[
-        str | None,
-        typer.Option(
-            "--wavelength-um", help="Wavelengths, for a material given as a table."
-        ),
-    ] = None,
+    wavelength: options.Wavelengths = None,
     n_theta: options.ThetaBins = 45,
     n_dphi: options.DphiBins = 90,
     stokes: options.StokesOption = Stokes.full,
@@ -68,14 +48,13 @@ def simulate(
 
     loaded = pbrdf.load_scene(scene)
     target_file = output or scene.with_suffix(".nc")
-    azimuth = "uniform" if phi_i == "uniform" else options.numbers(phi_i, "--phi-i-deg")[0]
     waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
     with staged_file(target_file, force=force) as stage:
         with progress_bar("tracing") as progress:
             result = pbrdf.simulate(
                 loaded,
                 np.deg2rad(options.numbers(theta_i, "--theta-i-deg")),
-                phi_i=azimuth if isinstance(azimuth, str) else float(np.deg2rad(azimuth)),
+                phi_i=options.azimuths(phi_i),
                 n_rays=n_rays,
                 realizations=realizations,
                 seed=seed,
@@ -103,6 +82,11 @@ def budget(result: "xr.Dataset") -> Iterator[str]:
     """Yield where the light went, one line an incidence (the first wavelength)."""
     import numpy as np
 
+    if "phi_i" in result.dims:
+        for position, phi_i in enumerate(result.phi_i.values):
+            yield f"azimuth {np.rad2deg(phi_i):.4g}°:"
+            yield from budget(result.isel(phi_i=position))
+        return
     if "wavelength" in result.dims:
         result = result.isel(wavelength=0)
     for position, theta_i in enumerate(result.theta_i.values):

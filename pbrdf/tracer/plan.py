@@ -76,6 +76,12 @@ class Plan:
             half_angle=self.half_angle, n_sums=n_sums,
         )  # fmt: skip
 
+    def at(self, phi_i: float | None) -> "Plan":
+        """Return the plan of another azimuth; both share what does not depend on it."""
+        other = replace(self, phi_i=phi_i)
+        other.__dict__["spectrum"] = self.spectrum
+        return other
+
     @property
     def tally_shape(self) -> tuple[int, ...]:
         """Shape (angles, wavelengths, bounces, n_theta, n_dphi, stokes, stokes)."""
