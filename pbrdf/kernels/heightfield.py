@@ -37,27 +37,38 @@ Terrain = namedtuple(
 )
 
 
-def block_maxima(heights: np.ndarray, periodic: bool) -> tuple[np.ndarray, np.ndarray]:
+@jit
+def block_maxima(heights, periodic):
     """Maximum height over blocks of 2, 4, 8 ... cells.
 
     Returns the levels one after another in a flat array, level 1 first, and the table
     (offset, blocks along y) of each level, shape (levels, 2).
     """
-    if periodic:
-        top = np.maximum(heights, np.roll(heights, -1, axis=0))
-        top = np.maximum(top, np.roll(top, -1, axis=1))
-    else:
-        top = np.maximum(heights[1:], heights[:-1])
-        top = np.maximum(top[:, 1:], top[:, :-1])
-    levels, table, offset = [], [], 0
-    while True:
-        top = np.pad(top, [(0, n % 2) for n in top.shape], constant_values=-np.inf)
-        top = top.reshape(top.shape[0] // 2, 2, top.shape[1] // 2, 2).max(axis=(1, 3))
-        levels.append(top.ravel())
-        table.append((offset, top.shape[1]))
-        offset += top.size
-        if max(top.shape) <= 2:
-            return np.concatenate(levels), np.array(table, dtype=np.int64)
+    nx, ny = heights.shape
+    if not periodic:
+        nx, ny = nx - 1, ny - 1
+    depth = 1
+    while max(nx, ny) > 2 << depth:
+        depth += 1
+    levels = np.empty((depth, 2), dtype=np.int64)
+    size = 0
+    for level in range(depth):
+        levels[level] = size, (ny + (2 << level) - 1) >> (level + 1)
+        size += ((nx + (2 << level) - 1) >> (level + 1)) * levels[level, 1]
+    maxima = np.full(size, -np.inf)
+    row = levels[0, 1]
+    for i in range(nx):
+        for j in range(ny):
+            z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
+            block = (i >> 1) * row + (j >> 1)
+            maxima[block] = max(maxima[block], max(max(z00, z10), max(z01, z11)))
+    for level in range(1, depth):
+        below, row_below = levels[level - 1]
+        offset, row = levels[level]
+        for k in range(offset - below):
+            block = offset + (k // row_below >> 1) * row + (k % row_below >> 1)
+            maxima[block] = max(maxima[block], maxima[below + k])
+    return maxima, levels
 
 
 @jit(allocates=False)

@@ -53,7 +53,10 @@ class HeightMap:
         periodic: bool = False,
         labels: npt.ArrayLike | None = None,
     ) -> None:
-        grid = np.array(heights, dtype=np.float64)
+        # An array that nobody can write to any more is taken as it is
+        grid = np.asarray(heights, dtype=np.float64)
+        if grid.flags.writeable or grid.base is not None:
+            grid = grid.copy()
         if grid.ndim != 2 or min(grid.shape) < 2:
             msg = (
                 f"heights must have shape (nx, ny) with at least 2 x 2 nodes, got shape "

@@ -169,3 +169,15 @@ def test_a_height_map_keeps_its_own_copy():
 def test_wrong_surfaces_are_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_a_height_map_shares_only_what_nobody_can_write_to():
+    heights = np.arange(12.0).reshape(3, 4)
+    copied = HeightMap(heights, 1.0)
+    view = heights.view()
+    view.setflags(write=False)
+    through_a_view = HeightMap(view, 1.0)
+    heights[0, 0] = 99.0
+    assert copied.heights[0, 0] == through_a_view.heights[0, 0] == 0.0
+    heights.setflags(write=False)
+    assert HeightMap(heights, 1.0).heights is heights
