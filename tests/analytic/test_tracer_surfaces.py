@@ -172,7 +172,7 @@ def test_wrong_surfaces_are_refused(call, message):
 
 
 def test_a_height_map_shares_only_what_nobody_can_write_to():
-    heights = np.arange(12.0).reshape(3, 4)
+    heights = np.arange(12.0).reshape(3, 4).copy()
     copied = HeightMap(heights, 1.0)
     view = heights.view()
     view.setflags(write=False)
