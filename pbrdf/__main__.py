@@ -1,0 +1,5 @@
+"""`python -m pbrdf`: the command line."""
+
+from pbrdf.cli import main
+
+main()
