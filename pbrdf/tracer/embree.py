@@ -34,9 +34,9 @@ _SIGNATURES = {
     "rtcNewScene": (_HANDLE, [_HANDLE]),
     "rtcSetSceneFlags": (None, [_HANDLE, _NUMBER]),
     "rtcNewGeometry": (_HANDLE, [_HANDLE, _NUMBER]),
-    "rtcSetSharedGeometryBuffer": (
-        None,
-        [_HANDLE, _NUMBER, _NUMBER, _NUMBER, _HANDLE, *[ctypes.c_size_t] * 3],
+    "rtcSetNewGeometryBuffer": (
+        _HANDLE,
+        [_HANDLE, _NUMBER, _NUMBER, _NUMBER, ctypes.c_size_t, ctypes.c_size_t],
     ),
     "rtcCommitGeometry": (None, [_HANDLE]),
     "rtcAttachGeometry": (_NUMBER, [_HANDLE, _HANDLE]),
@@ -84,7 +84,7 @@ def device() -> int:
 
 
 def build_tree(mesh: Mesh) -> int:
-    """Embree's scene of a mesh, whose arrays must outlive it.
+    """Build Embree's scene of a mesh, whose arrays it copies.
 
     Raises
     ------
@@ -99,9 +99,12 @@ def build_tree(mesh: Mesh) -> int:
         (BUFFER_VERTEX, FORMAT_FLOAT3, mesh.vertices),
         (BUFFER_INDEX, FORMAT_UINT3, mesh.faces),
     ):
-        embree.rtcSetSharedGeometryBuffer(
-            geometry, kind, 0, form, array.ctypes.data, 0, array.strides[0], len(array)
+        # Embree makes its own buffer a little longer, as it reads 16 bytes at a time
+        buffer = embree.rtcSetNewGeometryBuffer(
+            geometry, kind, 0, form, array.strides[0], len(array)
         )
+        if buffer is not None:
+            ctypes.memmove(buffer, array.ctypes.data, array.nbytes)
     embree.rtcCommitGeometry(geometry)
     embree.rtcAttachGeometry(scene, geometry)
     embree.rtcReleaseGeometry(geometry)
