@@ -93,13 +93,12 @@ def heights_in_cylinder(radius, d_x, d_y, d_z, k_x, k_y, k_z):
 
 
 @jit(allocates=False)
-def stack_interval(bodies, k, d_x, d_y, d_z, k_x, k_y, k_z):
-    """`body_interval` of a body of several slabs."""
-    slabs = bodies.slabs
-    wide = bodies.radius[k] * (1.0 + CLOSE)
+def stack_interval(slabs, first, last, radius, d_x, d_y, d_z, k_x, k_y, k_z):
+    """`body_interval` of a body of several slabs, `first` to `last`."""
+    wide = radius * (1.0 + CLOSE)
     lowest, highest = heights_in_cylinder(wide, d_x, d_y, d_z, k_x, k_y, k_z)
     t_in, t_out = MISSED
-    for index in range(bodies.slab_start[k], bodies.slab_start[k + 1]):
+    for index in range(first, last):
         low = slabs[index, LOW]
         high = slabs[index, HIGH]
         if high < lowest or low > highest:
@@ -125,18 +124,18 @@ def body_interval(bodies, k, d_x, d_y, d_z, k_x, k_y, k_z):
 
     (d_x, d_y, d_z) is the start relative to the axis and the reference height.
     """
-    first = bodies.slab_start[k]
-    if bodies.slab_start[k + 1] - first > 1:
-        return stack_interval(bodies, k, d_x, d_y, d_z, k_x, k_y, k_z)
+    slabs, first, last = bodies.slabs, bodies.slab_start[k], bodies.slab_start[k + 1]
+    if last - first > 1:
+        radius = bodies.radius[k]
+        return stack_interval(slabs, first, last, radius, d_x, d_y, d_z, k_x, k_y, k_z)
     # One closed quadric needs no clipping
-    slabs = bodies.slabs
     return slab_interval(
         slabs[first, CONSTANT], slabs[first, LINEAR], slabs[first, SQUARE],
         d_x, d_y, d_z, k_x, k_y, k_z, -FAR, FAR,
     )  # fmt: skip
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def body_normal(bodies, k, d_x, d_y, d_z):
     """Outward normal of body k at a point of its surface, relative to axis and height."""
     index = bodies.slab_start[k]
@@ -179,7 +178,7 @@ def is_known(state, top, k, axis_x, axis_y, radius):
     return False
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def next_body(bodies, state, top, t_limit, hit):
     """Body whose surface a beam enters next before t_limit; NO_BODY if it meets none.
 

@@ -57,6 +57,7 @@ from pbrdf.kernels.heightfield import (
     facet_slopes,
     walk_until,
 )
+from pbrdf.kernels.horizon import is_free
 from pbrdf.kernels.interfaces import GRAZING
 
 MAX_STEPS = 10_000_000
@@ -91,7 +92,7 @@ def medium_of(world, state, top):
     return medium
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def next_facet(terrain, state, top, start, lift, flip, t_limit, hit):
     """Facet of a lifted or flipped height field that the beam meets before t_limit.
 
@@ -102,6 +103,9 @@ def next_facet(terrain, state, top, start, lift, flip, t_limit, hit):
     # A ray that rises more steeply than any facet can meet none
     if k_z >= terrain.free_slope * math.sqrt(k_x * k_x + k_y * k_y):
         return ESCAPED
+    speed_x = k_x / terrain.pitch_x
+    speed_y = k_y / terrain.pitch_y
+    z = flip * (state[top, Z] - lift)
     facet = -1
     rate = 0.0
     if state[top, START] == start:
@@ -117,9 +121,15 @@ def next_facet(terrain, state, top, start, lift, flip, t_limit, hit):
         i = min(int(x), nx - 1)
         j = min(int(y), ny - 1)
         u, v = x - i, y - j
+    # Nor can one that rises above all that lies ahead
+    if (
+        k_z > 0.0
+        and terrain.horizon.size > 0
+        and is_free(terrain.horizon, terrain.z_top, i, j, z, speed_x, speed_y, k_z)
+    ):
+        return ESCAPED
     fate, i, j, facet, u, v, z, t = walk_until(
-        terrain, i, j, facet, u, v, flip * (state[top, Z] - lift),
-        k_x / terrain.pitch_x, k_y / terrain.pitch_y, k_z, rate, t_limit, MAX_STEPS,
+        terrain, i, j, facet, u, v, z, speed_x, speed_y, k_z, rate, t_limit, MAX_STEPS,
     )  # fmt: skip
     if fate == HIT:
         hit[HIT_T] = t
@@ -193,14 +203,8 @@ def next_event(world, state, top, hit):
     if conformal:
         # The upper side of the film, the surface lifted by its thickness, from either side
         flip = -1.0 if in_film else 1.0
-        if in_film:
-            fate = next_facet(
-                film.flipped, state, top, ON_FILM, film.height, flip, hit[HIT_T], hit
-            )
-        else:
-            fate = next_facet(
-                terrain, state, top, ON_FILM, film.height, flip, hit[HIT_T], hit
-            )
+        upper = film.flipped if in_film else terrain
+        fate = next_facet(upper, state, top, ON_FILM, film.height, flip, hit[HIT_T], hit)
         if fate == HIT:
             kind = FILM_UP if in_film else FILM_DOWN
     if not conformal or in_film:
@@ -291,7 +295,7 @@ def normal_at(world, state, top, kind, hit):
     return -slope_x * scale, -slope_y * scale, scale
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def set_rate(state, top, n_x, n_y, n_z):
     """Speed at which the beam leaves the facet it starts on, up or down from it."""
     along = state[top, KX] * n_x + state[top, KY] * n_y + state[top, KZ] * n_z

@@ -14,13 +14,15 @@ from pbrdf.kernels.beams import (
     CELL_J,
     EVENTS,
     FACET,
+    FREE,
     KX,
     KY,
     KZ,
     LEFT,
     MUELLER,
-    N_STATE,
+    N_INSIDE,
     NOTHING,
+    START,
     SX,
     SY,
     SZ,
@@ -188,7 +190,7 @@ def meet_solid(
     return top - 1
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def deposit(state, top, columns, w, cos_phi_i, sin_phi_i, tally):
     """Add the matrix of a beam that leaves the scene to its bin."""
     k_x, k_y, k_z = state[top, KX], state[top, KY], state[top, KZ]
@@ -228,12 +230,10 @@ def end_beam(state, top, kind, columns, w, cos_phi_i, sin_phi_i, tally):
             tally.counts[N_MISMATCH] += 1
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def launch_beam(state, x, y, z, beam, columns):
     """Start a beam of unit matrix in the air, of the light that `line_beam` tells."""
     _, _, sin_t, cos_t, cos_b, sin_b, s_x, s_y, s_z = beam
-    for column in range(N_STATE):
-        state[0, column] = 0.0
     state[0, X] = x
     state[0, Y] = y
     state[0, Z] = z
@@ -243,8 +243,13 @@ def launch_beam(state, x, y, z, beam, columns):
     state[0, SX] = s_x
     state[0, SY] = s_y
     state[0, SZ] = s_z
+    state[0, START] = FREE
     state[0, FACET] = -1.0
+    state[0, EVENTS] = 0.0
     state[0, LEFT] = NOTHING
+    state[0, N_INSIDE] = 0.0
+    for element in range(16):
+        state[0, MUELLER + element] = 0.0
     for row in range(columns):
         state[0, MUELLER + 5 * row] = 1.0
 
@@ -306,7 +311,7 @@ def follow_beam(
     return new
 
 
-@jit(allocates=False)
+@jit(forceinline=True)
 def trace_beams(
     world, w, number, source, cos_phi, sin_phi, max_events, columns, room, tally
 ):  # fmt: skip

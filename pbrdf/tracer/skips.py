@@ -85,6 +85,11 @@ def _about_contaminants(plan: Plan, steepest: float) -> list[str]:
             "The ground, for rays rising above its steepest facet in the first sample, a "
             f"slope of {steepest:.3g}: not searched."
         )
+    if "horizon" in plan.skips:
+        lines.append(
+            "The ground, for rays rising above all that lies ahead of it in their octant, "
+            f"by blocks of {BLOCK} cells: not searched."
+        )
     if not plan.media.absorption.any():
         lines.append("Absorption on the way: none in any medium, not computed.")
     return lines

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from pbrdf.kernels import bodies as bodies_kernel
 from pbrdf.kernels import events
 from pbrdf.kernels.heightfield import block_maxima
+from pbrdf.kernels.horizon import NO_HORIZON
 from pbrdf.kernels.shading import base_strength
 from pbrdf.optics.materials import Material
 from pbrdf.surface.bodies import Bodies, Placement, place
@@ -140,8 +141,9 @@ def world_of(
         below.setflags(write=terrain.heights.flags.writeable)
         maxima, levels = block_maxima(below, terrain.periodic)
         flipped = terrain._replace(
-            heights=below, maxima=maxima, levels=levels, z_top=-field.z_bottom
-        )
+            heights=below, maxima=maxima, levels=levels, z_top=-field.z_bottom,
+            horizon=NO_HORIZON,
+        )  # fmt: skip
     film = events.Film(kind, float(height), medium, flipped)
     bodies = _register(placement.bodies, field)
     if len(bodies.z) > 0:

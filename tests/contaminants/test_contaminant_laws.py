@@ -109,19 +109,42 @@ def test_wavelengths_are_traced_each_for_itself():
         assert_allclose(both.brdf.isel(wavelength=k), alone.brdf, rtol=1e-12, atol=1e-15)
 
 
+WET = Film(thickness=0.4, material=WATER)
+
+
 @pytest.mark.parametrize("finite", [False, True])
-def test_the_steep_skip_changes_nothing(finite):
+@pytest.mark.parametrize("contaminants", [crowd()[:-1], [*crowd()[:-1], WET], WET])
+def test_skips_change_nothing(finite, contaminants):
+    """Rays let go by their slope, or by what lies ahead, would have met nothing."""
     surface = ROUGH.sample(4)
     if finite:
         surface = HeightMap(surface.heights, surface.spacing)
-    scene = Scene(surface, PAINT, crowd()[:-1])
-    on, off = (
+    scene = Scene(surface, PAINT, contaminants)
+    on, steep, off = (
         simulate(scene, np.deg2rad([10.0, 40.0]), n_rays=6400, skips=skips)
-        for skips in (True, ("walk",))
+        for skips in (True, ("walk", "steep"), ("walk",))
     )
-    assert_allclose(on.brdf, off.brdf, rtol=1e-9, atol=1e-12)
+    for one in (on, steep):
+        assert_array_equal(one.brdf, off.brdf)
+        assert_array_equal(one.side_exits, off.side_exits)
     clean_counters(on)
     assert assert_closed(on) < 2e-4
+
+
+def test_skips_are_explained():
+    surface = GaussianSurface(shape=(64, 64), spacing=1.0, corr_length=8.0, slope_rms=0.2)
+    said = [
+        " ".join(
+            simulate(
+                Scene(surface, PAINT, WET), 0.3, n_rays=320, realizations=8, explain=True,
+                skips=skips,
+            ).attrs["explanation"]
+        )
+        for skips in (True, ("walk",))
+    ]  # fmt: skip
+    assert "steepest facet" in said[0]
+    assert "all that lies ahead" in said[0]
+    assert "lies ahead" not in said[1]
 
 
 def mean_matrix(zeniths, target, seed):
