@@ -12,10 +12,16 @@ import math
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.heightfield import FACET_HIGH, FACET_LOW, corner_heights, plane_height
+from pbrdf.kernels.profiles import (
+    FAR,
+    HIGH,
+    deepest_inside,
+    moment_between,
+    profile_crossing,
+    radius_squared,
+    widest_above,
+)
 
-LOW, HIGH, CONSTANT, LINEAR, SQUARE = 0, 1, 2, 3, 4
-FAR = 1e300
-ROOT_STEPS = 100
 SOLVER_STEPS = 80
 # How often to look for the lowest point near a body in an ever smaller circle
 FLOORS = 3
@@ -41,106 +47,6 @@ def surface_height(heights, periodic, pitch_x, pitch_y, x, y):
     z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
     facet = FACET_LOW if u - i > v - j else FACET_HIGH
     return plane_height(z00, z10, z01, z11, facet, u - i, v - j)
-
-
-@jit(inline="always")
-def radius_squared(slabs, s):
-    """Square of the radius at height s; below 0 beyond either end."""
-    index = 0
-    while index + 1 < slabs.shape[0] and s > slabs[index, HIGH]:
-        index += 1
-    return slabs[index, CONSTANT] + s * (slabs[index, LINEAR] + s * slabs[index, SQUARE])
-
-
-@jit(allocates=False)
-def moment_between(slabs, s_low, s_high):
-    """Integral of r²/2 over the heights of the body in between: its volume over 2 π."""
-    total = 0.0
-    for index in range(slabs.shape[0]):
-        low = max(slabs[index, LOW], s_low)
-        high = min(slabs[index, HIGH], s_high)
-        if high <= low:
-            continue
-        # About the lower end, so that small parts keep their digits
-        slope = slabs[index, LINEAR] + 2.0 * low * slabs[index, SQUARE]
-        squared = slabs[index, CONSTANT] + low * (
-            slabs[index, LINEAR] + low * slabs[index, SQUARE]
-        )
-        h = high - low
-        total += 0.5 * h * (squared + h * (slope / 2.0 + h * slabs[index, SQUARE] / 3.0))
-    return total
-
-
-@jit(allocates=False)
-def widest_above(slabs, s):
-    """Largest radius of the body at heights of at least s."""
-    largest = 0.0
-    for index in range(slabs.shape[0]):
-        high = slabs[index, HIGH]
-        if high <= s:
-            continue
-        low = max(slabs[index, LOW], s)
-        a = slabs[index, CONSTANT]
-        b = slabs[index, LINEAR]
-        c = slabs[index, SQUARE]
-        middle = low
-        if c < 0.0:
-            middle = min(max(-0.5 * b / c, low), high)
-        for t in (low, middle, high):
-            largest = max(largest, a + t * (b + c * t))
-    return math.sqrt(largest)
-
-
-@jit(allocates=False)
-def profile_crossing(slabs, r_a, s_a, r_b, s_b):
-    """Place on a segment, between one end inside and one outside, where it leaves."""
-    inside_a = radius_squared(slabs, s_a) - r_a * r_a > 0.0
-    low, high = 0.0, 1.0
-    f_low = radius_squared(slabs, s_a) - r_a * r_a
-    f_high = radius_squared(slabs, s_b) - r_b * r_b
-    side = 0
-    share = 0.5
-    for _ in range(ROOT_STEPS):
-        # Regula falsi in the Illinois form: safe, and nearly as quick as the secant
-        share = (low * f_high - high * f_low) / (f_high - f_low)
-        share = min(max(share, low), high)
-        r = r_a + (r_b - r_a) * share
-        s = s_a + (s_b - s_a) * share
-        f = radius_squared(slabs, s) - r * r
-        if f == 0.0 or high - low < 1e-15:
-            break
-        if (f > 0.0) == inside_a:
-            low, f_low = share, f
-            if side == 1:
-                f_high *= 0.5
-            side = 1
-        else:
-            high, f_high = share, f
-            if side == 2:
-                f_low *= 0.5
-            side = 2
-        if abs(f) < 1e-15 * (r * r + 1e-300):
-            break
-    return share
-
-
-@jit(allocates=False)
-def deepest_inside(slabs, r_a, s_a, r_b, s_b):
-    """Place on a segment with both ends outside where it is inside, or -1."""
-    slope = (s_b - s_a) / (r_b - r_a)
-    s_0 = s_a - slope * r_a
-    for index in range(slabs.shape[0]):
-        b = slabs[index, LINEAR]
-        c = slabs[index, SQUARE]
-        square = c * slope * slope - 1.0
-        if square >= 0.0:
-            continue
-        r = -0.5 * slope * (b + 2.0 * c * s_0) / square
-        s = s_0 + slope * r
-        in_slab = slabs[index, LOW] <= s <= slabs[index, HIGH]
-        if in_slab and r_a < r < r_b and slabs[index, CONSTANT] + s * (b + c * s) > r * r:
-            return (r - r_a) / (r_b - r_a)
-    return -1.0
 
 
 @jit(inline="always")
@@ -331,147 +237,3 @@ def settled_height(
         if not low < z < high:
             z = 0.5 * (low + high)
     return z, volume, wetted, rim
-
-
-@jit(allocates=False)
-def edge_rest(z_a, z_b, off_x, off_y, step_x, step_y, radius):
-    """Height of the centre of a sphere that lies on an edge, or -FAR if it touches none.
-
-    The edge goes from (off_x, off_y), relative to the axis, by (step_x, step_y).
-    """
-    length = math.sqrt(step_x * step_x + step_y * step_y)
-    slope = (z_b - z_a) / length
-    along = (off_x * step_x + off_y * step_y) / length
-    across = off_x * off_x + off_y * off_y - along * along
-    room = radius * radius - across
-    if room <= 0.0:
-        return -FAR
-    # Where the slope of the sphere's lower side is that of the edge
-    place = math.sqrt(room) * slope / math.sqrt(1.0 + slope * slope)
-    if place < along or place > along + length:
-        return -FAR
-    return z_a + (place - along) * slope + math.sqrt(room - place * place)
-
-
-@jit(allocates=False)
-def resting_height(heights, periodic, pitch_x, pitch_y, x, y, radius):
-    """Height of the centre of a sphere about the axis (x, y) that rests on the facets.
-
-    It touches a node, an edge or the inside of a facet: the highest of all candidates.
-    """
-    nx, ny = heights.shape
-    first_i = math.floor((x - radius) / pitch_x)
-    last_i = math.floor((x + radius) / pitch_x)
-    first_j = math.floor((y - radius) / pitch_y)
-    last_j = math.floor((y + radius) / pitch_y)
-    if not periodic:
-        first_i, first_j = max(first_i, 0), max(first_j, 0)
-        last_i, last_j = min(last_i, nx - 2), min(last_j, ny - 2)
-    best = -FAR
-    for i in range(first_i, last_i + 1):
-        for j in range(first_j, last_j + 1):
-            z00, z10, z01, z11 = corner_heights(
-                heights, i - (i // nx) * nx, j - (j // ny) * ny, periodic
-            )
-            a_x = i * pitch_x - x
-            a_y = j * pitch_y - y
-            b_x = a_x + pitch_x
-            b_y = a_y + pitch_y
-            # Nodes; their cell is the one beyond them, save on the far rim
-            for p_x, p_y, z in (
-                (a_x, a_y, z00), (b_x, a_y, z10), (a_x, b_y, z01), (b_x, b_y, z11),
-            ):  # fmt: skip
-                room = radius * radius - p_x * p_x - p_y * p_y
-                if room >= 0.0:
-                    best = max(best, z + math.sqrt(room))
-            best = max(best, edge_rest(z00, z10, a_x, a_y, pitch_x, 0.0, radius))
-            best = max(best, edge_rest(z00, z01, a_x, a_y, 0.0, pitch_y, radius))
-            best = max(best, edge_rest(z00, z11, a_x, a_y, pitch_x, pitch_y, radius))
-            best = max(best, edge_rest(z01, z11, a_x, b_y, pitch_x, 0.0, radius))
-            best = max(best, edge_rest(z10, z11, b_x, a_y, 0.0, pitch_y, radius))
-            # Facets, where the sphere's normal is theirs
-            for facet in (FACET_LOW, FACET_HIGH):
-                if facet == FACET_LOW:
-                    g_x, g_y = (z10 - z00) / pitch_x, (z11 - z10) / pitch_y
-                else:
-                    g_x, g_y = (z11 - z01) / pitch_x, (z01 - z00) / pitch_y
-                stretch = math.sqrt(1.0 + g_x * g_x + g_y * g_y)
-                p_x, p_y = radius * g_x / stretch, radius * g_y / stretch
-                u, v = (p_x - a_x) / pitch_x, (p_y - a_y) / pitch_y
-                on_it = u >= v if facet == FACET_LOW else v >= u
-                if on_it and 0.0 <= u <= 1.0 and 0.0 <= v <= 1.0:
-                    z = plane_height(z00, z10, z01, z11, facet, u, v)
-                    best = max(best, z + radius / stretch)
-    return best
-
-
-@jit(inline="always")
-def filled_triangle(level, z_a, z_b, z_c):
-    """Mean depth below a level over a triangle, and the share of it that is below."""
-    low = min(z_a, min(z_b, z_c))
-    high = max(z_a, max(z_b, z_c))
-    middle = z_a + z_b + z_c - low - high
-    if level >= high:
-        return level - (z_a + z_b + z_c) / 3.0, 1.0
-    if level <= low:
-        return 0.0, 0.0
-    if level <= middle:
-        # A small triangle at the lowest corner
-        share = (level - low) ** 2 / ((middle - low) * (high - low))
-        return share * (level - low) / 3.0, share
-    # All but a small triangle at the highest corner, where the depth would be negative
-    dry = (high - level) ** 2 / ((high - middle) * (high - low))
-    depth = level - (z_a + z_b + z_c) / 3.0 + dry * (high - level) / 3.0
-    return depth, 1.0 - dry
-
-
-@jit(allocates=False)
-def filled_volume(heights, periodic, pitch_x, pitch_y, level):
-    """Volume between the surface and a level above it, and the area that is wet."""
-    nx = heights.shape[0] if periodic else heights.shape[0] - 1
-    ny = heights.shape[1] if periodic else heights.shape[1] - 1
-    volume = 0.0
-    wet = 0.0
-    for i in range(nx):
-        for j in range(ny):
-            z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
-            depth, share = filled_triangle(level, z00, z10, z11)
-            volume += depth
-            wet += share
-            depth, share = filled_triangle(level, z00, z01, z11)
-            volume += depth
-            wet += share
-    half = 0.5 * pitch_x * pitch_y
-    return volume * half, wet * half
-
-
-@jit(allocates=False)
-def area_ratio(heights, periodic, pitch_x, pitch_y):
-    """Area of all facets over the area seen from above."""
-    nx = heights.shape[0] if periodic else heights.shape[0] - 1
-    ny = heights.shape[1] if periodic else heights.shape[1] - 1
-    total = 0.0
-    for i in range(nx):
-        for j in range(ny):
-            z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
-            g_x, g_y = (z10 - z00) / pitch_x, (z11 - z10) / pitch_y
-            total += math.sqrt(1.0 + g_x * g_x + g_y * g_y)
-            g_x, g_y = (z11 - z01) / pitch_x, (z01 - z00) / pitch_y
-            total += math.sqrt(1.0 + g_x * g_x + g_y * g_y)
-    return total / (2.0 * nx * ny)
-
-
-@jit(allocates=False)
-def steep_share(heights, periodic, pitch_x, pitch_y, slope):
-    """Share of the facets, by area seen from above, that are steeper than a slope."""
-    nx = heights.shape[0] if periodic else heights.shape[0] - 1
-    ny = heights.shape[1] if periodic else heights.shape[1] - 1
-    count = 0
-    for i in range(nx):
-        for j in range(ny):
-            z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
-            g_x, g_y = (z10 - z00) / pitch_x, (z11 - z10) / pitch_y
-            count += g_x * g_x + g_y * g_y > slope * slope
-            g_x, g_y = (z11 - z01) / pitch_x, (z01 - z00) / pitch_y
-            count += g_x * g_x + g_y * g_y > slope * slope
-    return count / (2.0 * nx * ny)

@@ -71,28 +71,19 @@ def block_maxima(heights, periodic):
     return maxima, levels
 
 
-@jit(allocates=False)
-def steepest_slope(heights, periodic, pitch_x, pitch_y):
-    """Largest slope of any facet, in its own direction of steepest ascent."""
-    nx = heights.shape[0] if periodic else heights.shape[0] - 1
-    ny = heights.shape[1] if periodic else heights.shape[1] - 1
-    largest = 0.0
-    for i in range(nx):
-        for j in range(ny):
-            z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
-            low = ((z10 - z00) / pitch_x) ** 2 + ((z11 - z10) / pitch_y) ** 2
-            high = ((z11 - z01) / pitch_x) ** 2 + ((z01 - z00) / pitch_y) ** 2
-            largest = max(largest, max(low, high))
-    return math.sqrt(largest)
+@jit(forceinline=True)
+def grid_cells(heights, periodic):
+    """Count the cells along x and y between nodes."""
+    nx, ny = heights.shape
+    if periodic:
+        return nx, ny
+    return nx - 1, ny - 1
 
 
 @jit(forceinline=True)
 def cell_counts(terrain):
     """Count the cells along x and y."""
-    nx, ny = terrain.heights.shape
-    if terrain.periodic:
-        return nx, ny
-    return nx - 1, ny - 1
+    return grid_cells(terrain.heights, terrain.periodic)
 
 
 @jit(forceinline=True)
@@ -109,12 +100,30 @@ def corner_heights(heights, i, j, periodic):
 
 
 @jit(forceinline=True)
-def facet_steps(terrain, i, j, facet):
-    """Height step per cell along x and y on one facet of cell (i, j)."""
-    z00, z10, z01, z11 = corner_heights(terrain.heights, i, j, terrain.periodic)
+def steps_of(z00, z10, z01, z11, facet):
+    """Height step per cell along x and y on one facet, from the corner heights."""
     if facet == FACET_LOW:
         return z10 - z00, z11 - z10
     return z11 - z01, z01 - z00
+
+
+@jit(forceinline=True)
+def facet_steps(terrain, i, j, facet):
+    """Height step per cell along x and y on one facet of cell (i, j)."""
+    z00, z10, z01, z11 = corner_heights(terrain.heights, i, j, terrain.periodic)
+    return steps_of(z00, z10, z01, z11, facet)
+
+
+@jit(forceinline=True)
+def squared_slopes(heights, i, j, periodic, pitch_x, pitch_y):
+    """Squares of the slopes of both facets of a cell, along their steepest ascent."""
+    z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
+    low_x, low_y = steps_of(z00, z10, z01, z11, FACET_LOW)
+    high_x, high_y = steps_of(z00, z10, z01, z11, FACET_HIGH)
+    return (
+        (low_x / pitch_x) ** 2 + (low_y / pitch_y) ** 2,
+        (high_x / pitch_x) ** 2 + (high_y / pitch_y) ** 2,
+    )
 
 
 @jit(forceinline=True)

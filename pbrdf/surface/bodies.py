@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from pbrdf.kernels.clipping import widest_above
+from pbrdf.kernels.profiles import widest_above
 from pbrdf.optics.materials import Material
 from pbrdf.surface.ground import Ground
 from pbrdf.surface.heightmap import HeightMap

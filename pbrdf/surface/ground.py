@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from pbrdf.kernels import clipping
+from pbrdf.kernels import clipping, relief, resting
 from pbrdf.surface.heightmap import HeightMap
 from pbrdf.surface.periodic import nearest, wrapped
 from pbrdf.surface.shapes import Shape
@@ -71,11 +71,11 @@ class Ground:
     @cached_property
     def wenzel_factor(self) -> float:
         """True area of the facets over the area seen from above. [1]"""
-        return float(clipping.area_ratio(*self._grid))
+        return float(relief.area_ratio(*self._grid))
 
     def steep_share(self, slope: float) -> float:
         """Share of the surface that is steeper than a slope. [1]"""
-        return float(clipping.steep_share(*self._grid, slope))
+        return float(relief.steep_share(*self._grid, slope))
 
     def wrapped(self, places: np.ndarray) -> np.ndarray:
         """Move places (..., 2) into the period; on a finite map they stay. [um]"""
@@ -99,7 +99,7 @@ class Ground:
 
     def rest(self, x: float, y: float, radius: float) -> float:
         """Height of the centre of a sphere that touches the surface from above. [um]"""
-        return float(clipping.resting_height(*self._grid, x, y, radius))
+        return float(resting.resting_height(*self._grid, x, y, radius))
 
     def azimuths(self, radius: float) -> int:
         """Count the azimuths over which volumes of a body this wide are summed."""
@@ -150,9 +150,9 @@ class Ground:
         low, high = self.lowest, self.highest + 2.0 * thickness
 
         def excess(level: float) -> float:
-            volume, _ = clipping.filled_volume(*self._grid, level)
+            volume, _ = relief.filled_volume(*self._grid, level)
             return float(volume / area - thickness)
 
         level = brentq(excess, low, high, xtol=1e-13 * (high - low), rtol=1e-15)
-        _, wetted = clipping.filled_volume(*self._grid, level)
+        _, wetted = relief.filled_volume(*self._grid, level)
         return float(level), float(wetted / area)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 
-from pbrdf.kernels.clipping import moment_between, radius_squared, widest_above
+from pbrdf.kernels.profiles import moment_between, radius_squared, widest_above
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pbrdf.kernels.heightfield import Terrain, block_maxima, steepest_slope
+from pbrdf.kernels.heightfield import Terrain, block_maxima
 from pbrdf.kernels.horizon import build_horizon
+from pbrdf.kernels.relief import steepest_slope
 from pbrdf.surface.heightmap import HeightMap
 from pbrdf.tracer.guard import guards, ways
 
