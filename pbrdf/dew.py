@@ -102,8 +102,12 @@ def compare_dew(  # noqa: PLR0913  (a scene, an amount and a run)
     whole.contact_angle.attrs = {"units": "rad", "long_name": "contact angle of the water"}
     whole["projected_solid_angle"] = repeats[0].projected_solid_angle
     whole = whole.merge(signatures(whole), combine_attrs="override")
-    whole["brdf_stderr"] = _stderr(whole.brdf_runs)
     whole["brdf"] = whole.brdf_runs.mean("run")
+    # A bin that no ray reached has the error of one
+    dark = whole.brdf.isel(stokes_out=0, stokes_in=0, drop=True) == 0.0
+    one = whole.one_path / whole.projected_solid_angle
+    stderr = _stderr(whole.brdf_runs).where(~dark, one)
+    whole["brdf_stderr"] = stderr.transpose(*whole.brdf.dims)
     whole.attrs |= {"warnings": list(notes), "runs": runs, "seed": seed}
     return whole.drop_vars(["brdf_runs", "one_path"])
 

@@ -11,7 +11,7 @@ import xarray as xr
 from pbrdf import GaussianSurface, Material
 from pbrdf.cli.dew import rows
 from pbrdf.cli.dew_figures import COLOURS
-from pbrdf.dew import compare_dew
+from pbrdf.dew import REGIONS, compare_dew
 
 HERE = Path(__file__).parent
 SURFACE = GaussianSurface(shape=(512, 512), spacing=2.0, corr_length=30.0, slope_rms=0.05)
@@ -64,38 +64,47 @@ def save(results: dict[str, xr.Dataset], path: Path) -> None:
                     writer.writerow(["case" if not line else label, *row])
 
 
-def figure(results: dict[str, xr.Dataset], path: Path) -> None:
-    """Polarised radiance and its degree against the contact angle, dry as a line."""
+def saved(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def figure(path: Path) -> None:
+    """Polarised radiance and its degree in a saved table, dry as a line."""
     from matplotlib.figure import Figure
 
-    regions = ("lobe", "skirt", "wings", "hemisphere")
-    sheet = Figure(figsize=(13, 6.4), layout="constrained")
+    table = [row for row in saved(path) if row["theta_i_deg"] == "60"]
+    sheet = Figure(figsize=(13, 6.8), layout="constrained")
     axes = sheet.subplots(2, 4, sharex=True)
     for row, quantity in zip(axes, ("P", "DOLP"), strict=True):
-        for axis, region in zip(row, regions, strict=True):
-            for number, (paint, result) in enumerate(results.items()):
-                one = result.sel(region=region, quantity=quantity).isel(theta_i=1)
-                wet = one.isel(state=slice(1, None))
+        for axis, region in zip(row, REGIONS, strict=True):
+            for colour, paint in zip(COLOURS, PAINTS, strict=False):
+                here = [r for r in table if (r["case"], r["region"]) == (paint, region)]
+                if not here:
+                    continue
+                dry, *wet = here
                 axis.errorbar(
-                    np.rad2deg(wet.contact_angle), wet.signature, 2 * wet.signature_stderr,
-                    marker="o", ms=3.5, capsize=2, color=COLOURS[number], label=paint,
+                    [float(r["contact_angle_deg"]) for r in wet],
+                    [float(r[quantity]) for r in wet],
+                    [2 * float(r[f"{quantity}_stderr"]) for r in wet],
+                    marker="o", ms=3.5, capsize=2, color=colour, label=paint,
                 )  # fmt: skip
-                axis.axhline(
-                    float(one.signature[0]), ls="--", lw=0.9, color=COLOURS[number]
-                )
+                axis.axhline(float(dry[quantity]), ls="--", lw=0.9, color=colour)
             axis.set_title(region if quantity == "P" else "")
             axis.grid(alpha=0.25)
         row[0].set_ylabel(f"{quantity} [{'1' if quantity == 'DOLP' else '1/sr'}]")
     for axis in axes[1]:
         axis.set_xlabel("contact angle [deg]")
-    axes[0, 0].legend(frameon=False, title="incidence 60 deg; dashed: dry")
-    sheet.savefig(path, dpi=90)
+    sheet.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2,
+        frameon=False, title="incidence 60 deg; dashed: dry",
+    )  # fmt: skip
+    sheet.savefig(path.with_suffix(".png"), dpi=90)
 
 
 def summary(path: Path, quantity: str) -> None:
     """Print, from a table that was saved, how dew changes a quantity."""
-    with path.open(encoding="utf-8") as file:
-        table = list(csv.DictReader(file))
+    table = saved(path)
     for case in dict.fromkeys(row["case"] for row in table):
         for theta_i in dict.fromkeys(row["theta_i_deg"] for row in table):
             here = [r for r in table if (r["case"], r["theta_i_deg"]) == (case, theta_i)]
@@ -128,13 +137,17 @@ def main() -> None:
     parser.add_argument("--number-density", type=float, default=NUMBER_DENSITY)
     parser.add_argument("--paint", choices=tuple(PAINTS), help="only this one")
     parser.add_argument("--no-volumes", action="store_true", help="contact angles only")
-    parser.add_argument("--summary", action="store_true", help="of what was saved")
+    parser.add_argument(
+        "--summary", action="store_true", help="and figures of what was saved"
+    )
     parser.add_argument("--quantity", default="P", choices=SHOWN, help="of the summary")
     options = parser.parse_args()
     if options.summary:
         for path in sorted(HERE.glob("*.csv")):
             print(f"\n== {path.name}")
             summary(path, options.quantity)
+            if path.name != "volumes.csv":
+                figure(path)
         return
     begin = perf_counter()
     paints = [options.paint] if options.paint else list(PAINTS)
@@ -143,7 +156,7 @@ def main() -> None:
         show(result, f"{paint} paint, {VOLUME} um of water, {options.sizes} drops")
     suffix = "" if options.sizes == "equal" else f"_{options.sizes}"
     save(angles, HERE / f"contact_angles{suffix}.csv")
-    figure(angles, HERE / f"contact_angles{suffix}.png")
+    figure(HERE / f"contact_angles{suffix}.csv")
     if not options.no_volumes:
         volumes = {
             f"{paint} {volume}": compare(paint, VOLUME_CONTACT, volume, options)

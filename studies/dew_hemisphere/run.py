@@ -23,7 +23,7 @@ def in_plane_figure(result, path: Path) -> None:
     """M00 and M10 in the plane of incidence, with bars of two standard errors."""
     from matplotlib.figure import Figure
 
-    sheet = Figure(figsize=(12.5, 6.4), layout="constrained")
+    sheet = Figure(figsize=(12.5, 6.7), layout="constrained")
     axes = sheet.subplots(2, len(INCIDENCE), sharex=True, squeeze=False)
     zenith = np.rad2deg(result.theta_s.values)
     view = np.concatenate([-zenith[::-1], zenith])
@@ -47,7 +47,10 @@ def in_plane_figure(result, path: Path) -> None:
             axes[row, column].set_ylabel(f"{name} [1/sr]")
         axes[0, column].set_title(f"incidence {theta_i:g} deg")
         axes[1, column].set_xlabel("view zenith [deg], forward positive")
-    axes[0, 0].legend(frameon=False)
+    sheet.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4,
+        frameon=False,
+    )  # fmt: skip
     sheet.savefig(path, dpi=90)
 
 

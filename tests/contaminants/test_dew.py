@@ -52,6 +52,16 @@ def test_water_darkens_the_lobe_of_a_smooth_paint(result):
     assert (abs(sums) < 6 * np.sqrt((spread**2).sum(("theta_s", "dphi")))).all()
 
 
+def test_a_bin_without_rays_has_the_error_of_one(result):
+    dry = result.isel(state=0, theta_i=1, stokes_out=0, stokes_in=0)
+    dark = (dry.brdf == 0.0).values
+    assert 0.5 < dark.mean() < 1.0
+    one = (dry.brdf_stderr * dry.projected_solid_angle).values[dark]
+    # 6 runs of 3000 rays that bounce once: each carries the mean reflectance
+    assert_allclose(one, float(dry.albedo) / 18_000, rtol=0.02)
+    assert result.brdf_stderr.dims == result.brdf.dims
+
+
 def test_a_region_without_rays_has_the_error_of_one(result):
     dark = result.isel(state=0).sel(region="wings").isel(theta_i=0)
     assert float(dark.signature.sel(quantity="M00")) == 0.0

@@ -6,8 +6,10 @@ from numpy.testing import assert_allclose
 from scipy.special import erfc
 
 from pbrdf import GaussianSurface, HeightMap
+from pbrdf.surface.ground import Ground
 from pbrdf.surface.wetting import (
     cassie_contact_angle,
+    effective_contact_angle,
     hemiwicking_angle,
     wenzel_contact_angle,
     wenzel_factor,
@@ -70,3 +72,15 @@ def test_young_cassie_and_hemiwicking():
     assert_allclose(np.cos(hemiwicking_angle(2.0, 0.25)), 0.75 / 1.75)
     with pytest.raises(ValueError, match="gamma_lv must be positive"):
         young_contact_angle(gamma_sv=1.0, gamma_sl=1.0, gamma_lv=0.0)
+
+
+@pytest.mark.parametrize(("degrees", "told"), [(40.0, True), (60.0, False), (140.0, True)])
+def test_roughness_is_told_where_it_changes_the_angle_beyond_half_a_hysteresis(
+    degrees, told
+):
+    # Wenzel's factor 1.083 turns 40, 60 and 140 degrees into 33.9, 57.2 and 146.1
+    ground = Ground(gaussian(0.3).sample(3))
+    angle, notes = effective_contact_angle(np.deg2rad(degrees), ground, "warn")
+    assert angle == np.deg2rad(degrees)
+    assert any("Wenzel's law" in note for note in notes) == told
+    assert effective_contact_angle(np.deg2rad(degrees), ground, "ignore")[1] == []
