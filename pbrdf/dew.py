@@ -230,12 +230,9 @@ def _over_runs(repeats: Sequence[xr.Dataset]) -> xr.Dataset:
     budget = ("absorbed", "transmitted", "truncated", "leaked")
     found = xr.Dataset({"brdf_runs": brdf, "albedo": albedo.mean("run")})
     found["albedo_stderr"] = _stderr(albedo)
-    # An empty bin of `simulate` has the error of one ray, which over all runs counts less
+    # The mean path of a run, which over all runs counts less
     paths = [
-        (one.brdf_total_stderr[..., 0, 0] * one.projected_solid_angle)
-        .where(one.brdf_total[..., 0, 0] == 0.0)
-        .max(("theta_s", "dphi"))
-        .fillna(0.0)
+        one.albedo.sum("bounces") / np.maximum(one.attrs["rays_escaped"], 1)
         for one in repeats
     ]
     found["one_path"] = xr.concat(paths, "run").mean("run") / len(repeats)

@@ -120,7 +120,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
     -----
     A bin holds flux / (incident flux ∫cosθ dΩ). Standard errors come from independent
     surface realisations, or from 32 or more batches of rays where the surface is fixed.
-    A bin that no ray reached has the error of one ray.
+    A bin that few rays reached shares the noise of bins like it around; one in the dark has
+    the error of one ray.
 
     Examples
     --------

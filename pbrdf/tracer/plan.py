@@ -12,6 +12,7 @@ from pbrdf.kernels import shading
 from pbrdf.kernels.events import Media
 from pbrdf.kernels.moments import add_sample, fold_mirror
 from pbrdf.kernels.spectra import N_SUMS
+from pbrdf.tracer.neighbours import share_noise
 from pbrdf.tracer.spectra import WORTHWHILE, Spectrum
 
 
@@ -182,12 +183,23 @@ class Moments:
 
         The spread over samples says nothing of a bin that no path reached. A count of none,
         seen without prior knowledge, has variance 1: there the error is one path of the
-        mean strength `one`.
+        mean strength `one`. Bins that differ from their neighbours by noise alone share it.
         """
         if self.samples < 2:
             return np.full_like(scatter, np.nan)
-        spread = np.sqrt(scatter / (self.samples - 1) / self.samples)
-        return np.where(mean[..., :1, :1] == 0.0, one, spread)
+        variance = scatter / (self.samples - 1) / self.samples
+        variance = np.where(mean[..., :1, :1] == 0.0, one**2, variance)
+        _, _, weight = detector_bins(self.plan.n_theta, self.plan.n_dphi)
+        for place in np.ndindex(mean.shape[:-4]):
+            variance[place] = share_noise(
+                mean[place], variance[place], weight, one[place].item()
+            )
+        if self.plan.fold:
+            # Odd in dphi, so nothing in the plane of incidence, whatever the noise around
+            plane = variance[..., :: self.plan.n_dphi // 2, :, :]
+            plane[..., :2, 2:] = plane[..., 2:, :2] = 0.0
+        error: np.ndarray = np.sqrt(variance)
+        return error
 
     def _one_path(self) -> np.ndarray:
         """Mean flux of one escaped path (angles, wavelengths, bounces) in the mean flux."""
@@ -202,9 +214,13 @@ class Moments:
 
     def flux_total(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the same for all bounces together."""
+        return self._mean_total, self._stderr_total(self.plan.n_stokes)
+
+    def _stderr_total(self, elements: int) -> np.ndarray:
+        """Compute it for the first rows and columns."""
         one = np.sqrt((self._one_path() ** 2).sum(axis=2))[..., None, None, None, None]
-        stderr = self._stderr(self._mean_total, self._scatter_total, one)
-        return self._mean_total, stderr
+        first = (..., slice(elements), slice(elements))
+        return self._stderr(self._mean_total[first], self._scatter_total[first], one)
 
     def albedo(self) -> tuple[np.ndarray, np.ndarray]:
         """Albedo (angles, wavelengths, bounces) and its standard error."""
@@ -219,10 +235,8 @@ class Moments:
 
     def rel_error(self) -> float:
         """Largest standard error over M00 of the bins above a tenth of the peak."""
-        mean, stderr = self.flux_total()
+        m00, stderr = self._mean_total[..., 0, 0], self._stderr_total(1)[..., 0, 0]
         _, _, weight = detector_bins(self.plan.n_theta, self.plan.n_dphi)
-        m00 = mean[..., 0, 0] / weight
-        bright = m00 > 0.1 * m00.max(axis=(2, 3), keepdims=True)
-        if not bright.any():
-            return 0.0
-        return float(np.max(stderr[..., 0, 0][bright] / mean[..., 0, 0][bright]))
+        radiance = m00 / weight
+        bright = radiance > 0.1 * radiance.max(axis=(2, 3), keepdims=True)
+        return float(np.max(stderr[bright] / m00[bright])) if bright.any() else 0.0
