@@ -55,6 +55,7 @@ def to_dataset(
     if wavelength is not None:
         coords["wavelength"] = wavelength if spectral else float(wavelength)
 
+    rel_error = max(one.rel_error() for one in moments)
     layers = [_estimates(one) for one in moments]
     data: dict[str, Any] = {}
     for name, array in layers[0].items():
@@ -82,30 +83,24 @@ def to_dataset(
         "rays_left_sideways": counts[:, N_SIDE].tolist(),
         "self_hits": int(counts[:, N_SELF].sum()),
         "medium_mismatches": int(counts[:, N_MISMATCH].sum()),
-        "rel_error": max(one.rel_error() for one in moments),
+        "rel_error": rel_error,
     }
     return dataset
 
 
 def _estimates(moments: Moments) -> dict[str, np.ndarray]:
-    """Estimates of one azimuth, with the dimensions of the table but phi_i."""
+    """Estimates of one azimuth, which uses its moments up; dimensions but phi_i."""
     plan = moments.plan
     _, _, weight = detector_bins(plan.n_theta, plan.n_dphi)
-    per_weight = 1.0 / weight[:, :, None, None]
-
-    def by_bounces(flux: np.ndarray) -> np.ndarray:
-        # (theta_i, wavelength, bounces, ...) to (bounces, theta_i, wavelength, ...)
-        return np.moveaxis(flux, 2, 0) * per_weight
-
-    mean, stderr = moments.flux()
-    total, total_stderr = moments.flux_total()
+    brdf, stderr, total, total_stderr = moments.finish()
     albedo, albedo_stderr = moments.albedo()
     energy = moments.energy()
     return {
-        "brdf": by_bounces(mean),
-        "brdf_stderr": by_bounces(stderr),
-        "brdf_total": total * per_weight,
-        "brdf_total_stderr": total_stderr * per_weight,
+        # (theta_i, wavelength, bounces, ...) to (bounces, theta_i, wavelength, ...)
+        "brdf": np.moveaxis(brdf, 2, 0),
+        "brdf_stderr": np.moveaxis(stderr, 2, 0),
+        "brdf_total": total,
+        "brdf_total_stderr": total_stderr,
         "albedo": np.moveaxis(albedo, 2, 0),
         "albedo_stderr": np.moveaxis(albedo_stderr, 2, 0),
         "projected_solid_angle": weight,

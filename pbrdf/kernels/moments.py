@@ -9,36 +9,41 @@ def add_sample(
 ):  # fmt: skip
     """Add the `count`-th sample to the running moments (Welford) and clear its tally.
 
-    flux            tally of the sample (wavelengths, bounces, bins, elements)
-    room            to work in (bins, elements)
+    flux            tally of the sample (wavelengths, bounces, bins, elements), M00 first
+    room            to work in (elements,)
     mean, scatter   as flux; mean_total, scatter_total (wavelengths, bins, elements) of all
     bounces together
     albedo          M00 of the sample over all bins (wavelengths, bounces), written
     """
     share = 1.0 / count
+    albedo[:] = 0.0
     for w in range(flux.shape[0]):
         for cell in range(flux.shape[2]):
+            lit = False
             for e in range(flux.shape[3]):
-                room[cell, e] = 0.0
-        for b in range(flux.shape[1]):
-            light = 0.0
-            for cell in range(flux.shape[2]):
-                light += flux[w, b, cell, 0]
+                room[e] = 0.0
+            for b in range(flux.shape[1]):
+                # Where no light ever came all moments stay 0
+                if flux[w, b, cell, 0] == 0.0 == mean[w, b, cell, 0]:
+                    continue
+                lit = True
+                albedo[w, b] += flux[w, b, cell, 0]
                 for e in range(flux.shape[3]):
                     value = flux[w, b, cell, e] * scale
                     flux[w, b, cell, e] = 0.0
-                    room[cell, e] += value
+                    room[e] += value
                     change = value - mean[w, b, cell, e]
                     mean[w, b, cell, e] += change * share
                     scatter[w, b, cell, e] += change * (value - mean[w, b, cell, e])
-            albedo[w, b] = light * scale
-        for cell in range(flux.shape[2]):
+            if not lit:
+                continue
             for e in range(flux.shape[3]):
-                change = room[cell, e] - mean_total[w, cell, e]
+                change = room[e] - mean_total[w, cell, e]
                 mean_total[w, cell, e] += change * share
-                scatter_total[w, cell, e] += change * (
-                    room[cell, e] - mean_total[w, cell, e]
-                )
+                scatter_total[w, cell, e] += change * (room[e] - mean_total[w, cell, e])
+    for w in range(flux.shape[0]):
+        for b in range(flux.shape[1]):
+            albedo[w, b] *= scale
 
 
 @jit(allocates=False)

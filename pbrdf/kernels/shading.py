@@ -218,6 +218,22 @@ def lost_energy(end):
 
 
 @jit(forceinline=True)
+def add_light(mueller, n_stokes, flux, w, order, i_theta, i_dphi):
+    """Add a Mueller matrix to its bin."""
+    # Loops of known length: the compiler unrolls them
+    if n_stokes == 4:
+        for row in range(4):
+            for column in range(4):
+                flux[w, order, i_theta, i_dphi, row, column] += mueller[row, column]
+    elif n_stokes == 3:
+        for row in range(3):
+            for column in range(3):
+                flux[w, order, i_theta, i_dphi, row, column] += mueller[row, column]
+    else:
+        flux[w, order, i_theta, i_dphi, 0, 0] += mueller[0, 0]
+
+
+@jit(forceinline=True)
 def tally_path(
     end, record, ray, bounces, k_x, k_y, k_z, cos_phi_i, sin_phi_i, optics, tally
 ):  # fmt: skip
@@ -250,14 +266,4 @@ def tally_path(
     for w in range(energy.shape[0]):
         path_mueller(record, ray, bounces, w, optics, n_stokes, mueller)
         energy[w, ABSORBED] -= mueller[0, 0]
-        # Loops of known length: the compiler unrolls them
-        if n_stokes == 4:
-            for row in range(4):
-                for column in range(4):
-                    flux[w, order, i_theta, i_dphi, row, column] += mueller[row, column]
-        elif n_stokes == 3:
-            for row in range(3):
-                for column in range(3):
-                    flux[w, order, i_theta, i_dphi, row, column] += mueller[row, column]
-        else:
-            flux[w, order, i_theta, i_dphi, 0, 0] += mueller[0, 0]
+        add_light(mueller, n_stokes, flux, w, order, i_theta, i_dphi)

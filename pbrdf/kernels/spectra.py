@@ -30,6 +30,7 @@ from pbrdf.kernels.shading import (
     SPECULAR,
     TURN_C,
     TURN_S,
+    add_light,
     begin_columns,
     lost_energy,
     reflect_column,
@@ -186,9 +187,7 @@ def shade_paths(spectra, optics, tally):
                 i_theta = int(paths[row, 0, P_THETA])
                 i_dphi = int(paths[row, 0, P_DPHI])
                 order = min(bounces, flux.shape[1]) - 1
-                for i in range(n_stokes):
-                    for j in range(n_stokes):
-                        flux[w, order, i_theta, i_dphi, i, j] += mueller[i, j]
+                add_light(mueller, n_stokes, flux, w, order, i_theta, i_dphi)
             row += bounces + 2
     spectra.fill[0] = 0
 

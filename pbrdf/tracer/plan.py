@@ -11,8 +11,8 @@ from pbrdf.conventions import BOUNCES, detector_bins
 from pbrdf.kernels import shading
 from pbrdf.kernels.events import Media
 from pbrdf.kernels.moments import add_sample, fold_mirror
+from pbrdf.kernels.neighbours import N_BESIDE, estimate
 from pbrdf.kernels.spectra import N_SUMS
-from pbrdf.tracer.neighbours import share_noise
 from pbrdf.tracer.spectra import WORTHWHILE, Spectrum
 
 
@@ -138,7 +138,7 @@ class Moments:
         self._scatter = np.zeros(shape)
         self._mean_total = np.zeros(shape[:2] + shape[3:])
         self._scatter_total = np.zeros(shape[:2] + shape[3:])
-        self._room = np.empty((plan.n_theta * plan.n_dphi, plan.n_stokes**2))
+        self._room = np.empty(plan.n_stokes**2)
         self._albedo: list[np.ndarray] = []
         self._energy: list[np.ndarray] = []
 
@@ -178,49 +178,45 @@ class Moments:
         self._albedo.append(albedo)
         self._energy.append(tally.energy * scale[:, None, None])
 
-    def _stderr(self, mean: np.ndarray, scatter: np.ndarray, one: np.ndarray) -> np.ndarray:
-        """Compute the standard error of a mean over samples.
-
-        The spread over samples says nothing of a bin that no path reached. A count of none,
-        seen without prior knowledge, has variance 1: there the error is one path of the
-        mean strength `one`. Bins that differ from their neighbours by noise alone share it.
-        """
-        if self.samples < 2:
-            return np.full_like(scatter, np.nan)
-        variance = scatter / (self.samples - 1) / self.samples
-        variance = np.where(mean[..., :1, :1] == 0.0, one**2, variance)
-        _, _, weight = detector_bins(self.plan.n_theta, self.plan.n_dphi)
-        for place in np.ndindex(mean.shape[:-4]):
-            variance[place] = share_noise(
-                mean[place], variance[place], weight, one[place].item()
-            )
-        if self.plan.fold:
-            # Odd in dphi, so nothing in the plane of incidence, whatever the noise around
-            plane = variance[..., :: self.plan.n_dphi // 2, :, :]
-            plane[..., :2, 2:] = plane[..., 2:, :2] = 0.0
-        error: np.ndarray = np.sqrt(variance)
-        return error
-
     def _one_path(self) -> np.ndarray:
         """Mean flux of one escaped path (angles, wavelengths, bounces) in the mean flux."""
         counts = self.counts[:, None, shading.N_ORDERS : shading.N_MISMATCH]
         albedo = np.mean(self._albedo, axis=0)
         return np.where(counts > 0, albedo / np.maximum(counts, 1), 0.0)
 
-    def flux(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean flux by bounces and its standard error, in the shape of the plan."""
-        one = self._one_path()[..., None, None, None, None]
-        return self._mean, self._stderr(self._mean, self._scatter, one)
+    def _one_of_all(self) -> np.ndarray:
+        """Return the same for all bounces together (angles, wavelengths)."""
+        one: np.ndarray = np.sqrt((self._one_path() ** 2).sum(axis=2))
+        return one
 
-    def flux_total(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the same for all bounces together."""
-        return self._mean_total, self._stderr_total(self.plan.n_stokes)
+    def _estimate(self, mean: np.ndarray, scatter: np.ndarray, one: np.ndarray) -> None:
+        """Turn moments (..., n_theta, n_dphi, stokes, stokes) into BRDF and error in place.
 
-    def _stderr_total(self, elements: int) -> np.ndarray:
-        """Compute it for the first rows and columns."""
-        one = np.sqrt((self._one_path() ** 2).sum(axis=2))[..., None, None, None, None]
-        first = (..., slice(elements), slice(elements))
-        return self._stderr(self._mean_total[first], self._scatter_total[first], one)
+        `one` (...) is the flux of one path of mean strength.
+        """
+        _, _, weight = detector_bins(self.plan.n_theta, self.plan.n_dphi)
+        n_stokes = mean.shape[-1]
+        shape = *weight.shape, n_stokes**2
+        of_qu = np.arange(n_stokes) < 2
+        # Odd in dphi, so nothing in the plane of incidence, whatever the noise around
+        odd = (of_qu[:, None] != of_qu).ravel() & self.plan.fold
+        room = (
+            *np.empty((2, *weight.shape, n_stokes**2 + N_BESIDE)), np.empty(n_stokes**2),
+        )  # fmt: skip
+        for place in np.ndindex(mean.shape[:-4]):
+            estimate(
+                mean[place].reshape(shape), scatter[place].reshape(shape), self.samples,
+                one[place], weight, odd, room,
+            )  # fmt: skip
+
+    def finish(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """BRDF by bounces and its standard error, and of all bounces together. [1/sr]
+
+        Their arrays are those of the moments, which are used up.
+        """
+        self._estimate(self._mean, self._scatter, self._one_path())
+        self._estimate(self._mean_total, self._scatter_total, self._one_of_all())
+        return self._mean, self._scatter, self._mean_total, self._scatter_total
 
     def albedo(self) -> tuple[np.ndarray, np.ndarray]:
         """Albedo (angles, wavelengths, bounces) and its standard error."""
@@ -235,8 +231,8 @@ class Moments:
 
     def rel_error(self) -> float:
         """Largest standard error over M00 of the bins above a tenth of the peak."""
-        m00, stderr = self._mean_total[..., 0, 0], self._stderr_total(1)[..., 0, 0]
-        _, _, weight = detector_bins(self.plan.n_theta, self.plan.n_dphi)
-        radiance = m00 / weight
-        bright = radiance > 0.1 * radiance.max(axis=(2, 3), keepdims=True)
-        return float(np.max(stderr[bright] / m00[bright])) if bright.any() else 0.0
+        m00 = (..., slice(1), slice(1))
+        mean, scatter = self._mean_total[m00].copy(), self._scatter_total[m00].copy()
+        self._estimate(mean, scatter, self._one_of_all())
+        bright = mean > 0.1 * mean.max(axis=(2, 3), keepdims=True)
+        return float(np.max(scatter[bright] / mean[bright])) if bright.any() else 0.0

@@ -145,6 +145,25 @@ def wavelengths(n_rays):
     )
 
 
+def whole_runs(n_rays):
+    """Many wavelengths through `simulate`: surfaces, means and errors counted too."""
+    wave = np.linspace(0.4, 0.9, 100)
+    glass = pbrdf.Material.from_table(wavelength=wave, n=np.linspace(1.6, 1.4, 100))
+    scene = pbrdf.Scene(surface(SLOPE), glass)
+
+    def took(waves):
+        return seconds(
+            lambda: pbrdf.simulate(
+                scene, THETA, wavelength=waves, n_rays=n_rays, realizations=16
+            ), 2,
+        )  # fmt: skip
+
+    one = took(wave[:1])
+    for count, goal in ((20, 2), (100, 6)):
+        ratio = took(np.linspace(0.4, 0.9, count)) / one
+        print(f"  whole run, {count:3d} over one: {ratio:.2f}   (goal {goal})")
+
+
 def linearity(n_rays):
     """Time and memory against the number of rays."""
     field = prepare(surface(SLOPE).sample(3), frozenset(SKIPS))
@@ -243,6 +262,7 @@ def main():
         ("Workers", lambda: workers(options.rays // 8)),
         ("Skips", lambda: skips(options.rays // 10)),
         ("Wavelengths and Stokes elements", lambda: wavelengths(options.rays // 8)),
+        ("Wavelengths, whole runs", lambda: whole_runs(options.rays // 8)),
         ("Rays", lambda: linearity(options.rays // 4)),
         ("Time to 1 % in all bins within a tenth of the peak", curves),
         ("Time to a given error", lambda: time_to_error(options.error)),
