@@ -165,7 +165,7 @@ def observe(  # noqa: PLR0913  (the public signature)
     if len(scene.contaminants) > 0:
         msg = (
             f"contaminants must be empty to observe, got {len(scene.contaminants)}. "
-            "Use simulate for them."
+            "Use simulate with source_half_angle and bins as wide as the detector."
         )
         raise ValueError(msg)
     n, kappa, base = arguments.constants(scene, waves)

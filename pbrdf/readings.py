@@ -12,6 +12,30 @@ from pbrdf.tracer.look import Look, Sight
 __all__ = ["Readings", "as_scan", "to_dataset"]
 
 
+# Glints caught by luck whose spread counts as much as what near misses foretell
+FEW = 10.0
+
+
+class Running:
+    """Mean and sum of squared deviations over samples, added one by one (Welford)."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.count = 0
+        self.mean = np.zeros(shape)
+        self._scatter = np.zeros(shape)
+
+    def add(self, values: np.ndarray) -> None:
+        """Add one sample."""
+        self.count += 1
+        step = values - self.mean
+        self.mean += step / self.count
+        self._scatter += step * (values - self.mean)
+
+    def variance(self) -> np.ndarray:
+        """Return the variance of the mean."""
+        return self._scatter / (self.count - 1) / self.count
+
+
 class Readings:
     """Mean and standard error of the readings over samples, added in a fixed order."""
 
@@ -20,8 +44,9 @@ class Readings:
         self.samples = 0
         # All bounces together stand behind the classes of bounces
         shape = (look.size, len(BOUNCES) + 1, *look.shape[2:])
-        self._mean = np.zeros(shape)
-        self._scatter = np.zeros(shape)
+        self._all, self._steady = Running(shape), Running(shape)
+        self._foretold = np.zeros(shape)
+        self._glints = np.zeros(shape[:2])
         self.caught = np.zeros(look.shape[:2], dtype=np.int64)
         self._one = np.zeros(look.shape[:2])
         self.energy = np.zeros((look.shape[2], shading.N_ENERGIES))
@@ -32,11 +57,11 @@ class Readings:
     def add(self, sight: Sight) -> None:
         """Add one sample."""
         self.samples += 1
-        total = sight.brdf.sum(axis=1, keepdims=True)
-        values = np.concatenate([sight.brdf, total], axis=1)
-        step = values - self._mean
-        self._mean += step / self.samples
-        self._scatter += step * (values - self._mean)
+        self._all.add(_and_total(sight.brdf))
+        # What comes by luck, and seldom, has moments of its own
+        self._steady.add(_and_total(sight.brdf - sight.glints))
+        self._foretold += _and_total(sight.foretold)
+        self._glints += _and_total(sight.glints_caught)
         self.caught += sight.caught
         self._one = np.maximum(self._one, sight.one)
         self.energy += (sight.energy - self.energy) / self.samples
@@ -47,31 +72,44 @@ class Readings:
     @property
     def mean(self) -> np.ndarray:
         """Mean matrices (geometries, bounces and total, wavelengths, stokes, stokes)."""
-        return self._mean
+        return self._all.mean
 
     def stderr(self) -> np.ndarray:
         """Return standard errors of the mean, in its shape.
 
-        Where no path joined source and detector the spread says nothing: the error is then
-        one path, as strong as those found elsewhere in the run, or of matrix 1 if none was.
+        The spread over samples says little of glints that came by luck where few did, and
+        nothing where none did: there the paths that passed near foretell their variance.
+        With none of these the error is one path, as strong as those found elsewhere in the
+        run, or of matrix 1 if none was.
         """
         if self.samples < 2:
-            return np.full_like(self._mean, np.nan)
-        spread = np.sqrt(self._scatter / (self.samples - 1) / self.samples)
+            return np.full_like(self.mean, np.nan)
+        few = (FEW / (FEW + self._glints))[:, :, None, None, None]
+        foretold = self._steady.variance() + self._foretold / self.samples**2
+        variance = few * foretold + (1.0 - few) * self._all.variance()
+        dark = (self.mean[..., :1, :1] == 0.0) & (variance[..., :1, :1] == 0.0)
+        return np.where(dark, self._one_path()[..., None, None], np.sqrt(variance))
+
+    def _one_path(self) -> np.ndarray:
+        """One path in each reading (geometries, bounces and total, wavelengths)."""
         per_path = self._one / self.samples
-        found = self._mean[:, :-1, :, 0, 0].sum(axis=0)
+        found = self.mean[:, :-1, :, 0, 0].sum(axis=0)
         weight = (self.caught * per_path).sum(axis=0)[:, None]
         strength = np.divide(found, weight, out=np.ones_like(found), where=found > 0.0)
-        strength = np.minimum(strength, 1.0)
-        one = per_path[:, :, None] * strength
-        one = np.concatenate([one, np.sqrt((one**2).sum(axis=1, keepdims=True))], axis=1)
-        return np.where(self._mean[..., :1, :1] == 0.0, one[..., None, None], spread)
+        one = per_path[:, :, None] * np.minimum(strength, 1.0)
+        return np.concatenate([one, np.sqrt((one**2).sum(axis=1, keepdims=True))], axis=1)
 
     def rel_error(self) -> float:
         """Largest standard error over M00 of geometries above a tenth of the brightest."""
-        m00, stderr = self._mean[:, -1, :, 0, 0], self.stderr()[:, -1, :, 0, 0]
+        m00, stderr = self.mean[:, -1, :, 0, 0], self.stderr()[:, -1, :, 0, 0]
         bright = m00 > 0.1 * m00.max()
         return float(np.max(stderr[bright] / m00[bright])) if bright.any() else 0.0
+
+
+def _and_total(by_bounces: np.ndarray) -> np.ndarray:
+    """Put all bounces together behind the classes of bounces."""
+    total = by_bounces.sum(axis=1, keepdims=True)
+    return np.concatenate([by_bounces, total], axis=1)
 
 
 def to_dataset(

@@ -25,6 +25,7 @@ from pbrdf.kernels.observe_record import (
     A_X,
     A_Y,
     A_Z,
+    catch_glint,
     catch_path,
     lose_path,
 )
@@ -59,8 +60,10 @@ Bundle = namedtuple(
 # the hemisphere, their decay with each bounce, and the cone of one sample
 Rule = namedtuple("Rule", "kind first samples decay cos_spread sin_spread")
 COUNT, SHARE, FAR_END = 0, 1, 2
-# Columns of a target: sine and cosine of zenith, of azimuth from the bundle, of half-angle
-T_SIN, T_COS, T_COS_PHI, T_SIN_PHI, T_COS_HALF, T_SIN_HALF, N_TARGET = 0, 1, 2, 3, 4, 5, 6
+# Columns of a target: sine and cosine of zenith, of azimuth from the bundle, of half-angle,
+# cosine of the angle within which a path was near, and the mean square of what it adds then
+T_SIN, T_COS, T_COS_PHI, T_SIN_PHI, T_COS_HALF, T_SIN_HALF = 0, 1, 2, 3, 4, 5
+T_COS_NEAR, T_CHANCE, N_TARGET = 6, 7, 8
 # Columns of a hit whose hemisphere is being sampled: cell, facet, place, bounces before it,
 # mirrors before the first base of the path, rays still to send, weight of each
 H_I, H_J, H_FACET, H_U, H_V, H_Z, H_BOUNCE, H_MIRRORS, H_LEFT, H_WEIGHT, N_HIT = (
@@ -246,16 +249,20 @@ def follow_bundle(
                     k_x * axes[target, A_X] + k_y * axes[target, A_Y]
                     + k_z * axes[target, A_Z]
                 )  # fmt: skip
-                share = 0.0
-                if rule.kind == COUNT:
-                    share = 1.0 if along >= targets[target, T_COS_HALF] else 0.0
-                elif diffused:
+                if rule.kind != COUNT and diffused:
                     spread = math.pi * rule.sin_spread * rule.sin_spread
                     share = lens_flux(
                         along, 1.0, along, rule.cos_spread, rule.sin_spread,
                         targets[target, T_COS_HALF], targets[target, T_SIN_HALF],
                     ) / spread  # fmt: skip
-                else:
+                    if share > 0.0:
+                        catch_path(
+                            weight * share, target, axes, record, bounces,
+                            k_x, k_y, k_z, s_x, s_y, s_z, optics, catch,
+                        )  # fmt: skip
+                    continue
+                share = 1.0 if along >= targets[target, T_COS_HALF] else 0.0
+                if rule.kind != COUNT:
                     along = (
                         e_x * axes[target, A_X] + e_y * axes[target, A_Y]
                         + e_z * axes[target, A_Z]
@@ -268,10 +275,10 @@ def follow_bundle(
                         along, a_z, upright, bundle.cos_half, bundle.sin_half,
                         targets[target, T_COS_HALF], targets[target, T_SIN_HALF],
                     ) / cone_flux  # fmt: skip
-                if share > 0.0:
-                    catch_path(
-                        weight * share, target, axes, record, bounces,
-                        k_x, k_y, k_z, s_x, s_y, s_z, optics, catch,
+                if share > 0.0 or along > targets[target, T_COS_NEAR]:
+                    catch_glint(
+                        weight, max(share, 0.0), targets[target, T_CHANCE], target, axes,
+                        record, bounces, k_x, k_y, k_z, s_x, s_y, s_z, optics, catch,
                     )  # fmt: skip
         elif fate == SIDE and not splits:
             # Such a ray belongs to neither part of the fraction

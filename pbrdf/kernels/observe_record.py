@@ -26,9 +26,12 @@ from pbrdf.kernels.shading import (
     scatter_column,
 )
 
-# What is caught: flux (targets, bounces, wavelengths, stokes, stokes), paths caught
-# (targets, bounces), energy (wavelengths, N_ENERGIES), counts (N_COUNTS,), room (4, 4)
+# What is caught: flux (3, targets, bounces, wavelengths, stokes, stokes) of all paths, of
+# glints, and the variance of glints that near misses foretell; paths caught (2, targets,
+# bounces), all and glints; energy (wavelengths, N_ENERGIES), counts (N_COUNTS,) and room
+# (4, 4)
 Catch = namedtuple("Catch", "flux caught energy counts mueller")
+ALL, GLINTS, FORETOLD = 0, 1, 2
 # Columns of a target's axes over one line of bundles: direction, horizontal s axis
 A_X, A_Y, A_Z, A_SX, A_SY, N_AXES = 0, 1, 2, 3, 4, 5
 
@@ -67,11 +70,9 @@ def chain_mueller(record, bounces, w, optics, n_stokes, mueller):
                 scatter_column(strength, a_in, b_in, a_out, b_out, column, mueller)
 
 
-@jit(allocates=False)
-def catch_path(
-    weight, target, axes, record, bounces, k_x, k_y, k_z, s_x, s_y, s_z, optics, catch
-):  # fmt: skip
-    """Add a path that leaves along k, in the frame of the polariser of a target."""
+@jit(inline="always")
+def end_path(target, axes, record, bounces, k_x, k_y, k_z, s_x, s_y, s_z):
+    """Turn the frame of a path that leaves along k to that of the polariser of a target."""
     t_x, t_y, t_z = carried_axis(
         axes[target, A_X], axes[target, A_Y], axes[target, A_Z],
         axes[target, A_SX], axes[target, A_SY], k_x, k_y, k_z,
@@ -79,15 +80,51 @@ def catch_path(
     record[bounces, 0, TURN_C], record[bounces, 0, TURN_S] = turn_frame(
         k_x, k_y, k_z, s_x, s_y, s_z, t_x, t_y, t_z
     )
-    order = min(bounces, catch.flux.shape[1]) - 1
-    catch.caught[target, order] += 1
-    for w in range(catch.flux.shape[2]):
+
+
+@jit(allocates=False)
+def catch_path(
+    weight, target, axes, record, bounces, k_x, k_y, k_z, s_x, s_y, s_z, optics, catch
+):  # fmt: skip
+    """Add a path that leaves along k, in the frame of the polariser of a target."""
+    end_path(target, axes, record, bounces, k_x, k_y, k_z, s_x, s_y, s_z)
+    order = min(bounces, catch.flux.shape[2]) - 1
+    catch.caught[ALL, target, order] += 1
+    for w in range(catch.flux.shape[3]):
         chain_mueller(record, bounces, w, optics, optics.n_stokes, catch.mueller)
         for row in range(optics.n_stokes):
             for column in range(optics.n_stokes):
-                catch.flux[target, order, w, row, column] += (
+                catch.flux[ALL, target, order, w, row, column] += (
                     weight * catch.mueller[row, column]
                 )
+
+
+@jit(allocates=False)
+def catch_glint(
+    weight, share, chance, target, axes, record, bounces, k_x, k_y, k_z, s_x, s_y, s_z,
+    optics, catch,
+):  # fmt: skip
+    """Add a path that may have met the target by luck, and what others like it might add.
+
+    share       part of the path's weight that the target gets
+    chance      mean of its square over all places where the path might have passed as near
+    """
+    end_path(target, axes, record, bounces, k_x, k_y, k_z, s_x, s_y, s_z)
+    order = min(bounces, catch.flux.shape[2]) - 1
+    if share > 0.0:
+        catch.caught[ALL, target, order] += 1
+        catch.caught[GLINTS, target, order] += 1
+    for w in range(catch.flux.shape[3]):
+        chain_mueller(record, bounces, w, optics, optics.n_stokes, catch.mueller)
+        for row in range(optics.n_stokes):
+            for column in range(optics.n_stokes):
+                light = weight * catch.mueller[row, column]
+                catch.flux[FORETOLD, target, order, w, row, column] += (
+                    chance * light * light
+                )
+                light *= share
+                catch.flux[ALL, target, order, w, row, column] += light
+                catch.flux[GLINTS, target, order, w, row, column] += light
 
 
 @jit(allocates=False)

@@ -3,13 +3,18 @@
 import numpy as np
 
 from pbrdf.kernels import observe_paths, shading
-from pbrdf.kernels.observe_paths import FAR_END, Bundle, Rule
-from pbrdf.kernels.observe_record import N_AXES, Catch
+from pbrdf.kernels.observe_lens import cap_flux, lens_flux
+from pbrdf.kernels.observe_paths import COUNT, FAR_END, Bundle, Rule
+from pbrdf.kernels.observe_record import ALL, FORETOLD, GLINTS, N_AXES, Catch
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.look import Sums, forward
 
 # Largest cone that stands for one sample of the hemisphere [rad]
 WIDEST_SAMPLE = 0.2
+# A path was near a cone within so many times the angle at which it would just add to it,
+# at most this angle [rad] unless that is smaller
+NEAR = 4.0
+FARTHEST_NEAR = 0.35
 
 
 def send_bundles(
@@ -41,6 +46,7 @@ def send_bundles(
         kind, first, float(look.hemisphere_samples), float(look.sample_decay), cos_spread,
         np.sqrt(1.0 - cos_spread**2),
     )  # fmt: skip
+    reach, chance = near_misses(half_here, half_there, counting=kind == COUNT)
     record = np.empty((look.max_bounces + 1, 1, shading.N_RECORD))
     hits = np.empty((look.max_bounces, observe_paths.N_HIT))
     shape = look.shape[1:]
@@ -50,7 +56,8 @@ def send_bundles(
             [
                 np.sin(there[group]), np.cos(there[group]), np.cos(turn[group]),
                 np.sin(turn[group]), np.full(len(group), np.cos(half_there)),
-                np.full(len(group), np.sin(half_there)),
+                np.full(len(group), np.sin(half_there)), np.full(len(group), np.cos(reach)),
+                np.full(len(group), chance),
             ],
             axis=1,
         )  # fmt: skip
@@ -63,8 +70,8 @@ def send_bundles(
             look.n_rays, rng.random(5), rng.integers(2**63, dtype=np.uint64),
         )  # fmt: skip
         catch = Catch(
-            np.zeros((len(group), *shape)),
-            np.zeros((len(group), shape[0]), dtype=np.int64),
+            np.zeros((3, len(group), *shape)),
+            np.zeros((2, len(group), shape[0]), dtype=np.int64),
             np.zeros((shape[1], shading.N_ENERGIES)),
             np.zeros(shading.N_COUNTS, dtype=np.int64), np.zeros((4, 4)),
         )  # fmt: skip
@@ -82,8 +89,12 @@ def send_bundles(
             raise ValueError(msg)
         scale = 1.0 / ((look.n_rays - aside) * omega_there[group])
         flux = catch.flux * scale[:, None, None, None, None]
-        sample.brdf[group] += flux if from_source else forward(flux)
-        sample.caught[group] += catch.caught
+        foretold = flux[FORETOLD] * scale[:, None, None, None, None]
+        sample.brdf[group] += flux[ALL] if from_source else forward(flux[ALL])
+        sample.glints[group] += flux[GLINTS] if from_source else forward(flux[GLINTS])
+        sample.foretold[group] += foretold if from_source else foretold.swapaxes(-1, -2)
+        sample.caught[group] += catch.caught[ALL]
+        sample.glints_caught[group] += catch.caught[GLINTS]
         # A bundle weighs at most as the smaller of the two cones
         weight = np.minimum(1.0, (np.sin(half_there) / np.sin(half_here)) ** 2)
         sample.one[group] = np.maximum(sample.one[group], (weight * scale)[:, None])
@@ -93,3 +104,24 @@ def send_bundles(
             sample.valued += look.n_rays
         sample.counts += catch.counts
         sample.bundles += look.n_rays
+
+
+def near_misses(
+    half_here: float, half_there: float, *, counting: bool
+) -> tuple[float, float]:
+    """Angle within which a path was near a cone, and the mean square of its share there.
+
+    A path that left anywhere as near would have been as likely: from the strength of those
+    that did follows the variance of what a cone gets by luck, before it gets any.
+    """
+    touching = half_there if counting else half_here + half_there
+    reach = max(touching, min(NEAR * touching, FARTHEST_NEAR))
+    edges = np.linspace(0.0, touching, 201)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    share = np.ones_like(middle)
+    if not counting:
+        here, there = ((np.cos(half), np.sin(half)) for half in (half_here, half_there))
+        share = np.array([lens_flux(c, 1.0, c, *here, *there) for c in np.cos(middle)])
+        share = share / cap_flux(1.0, here[1])
+    ring = -np.diff(np.cos(edges)) / (1.0 - np.cos(reach))
+    return reach, float(np.sum(share**2 * ring))

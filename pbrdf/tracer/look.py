@@ -87,6 +87,10 @@ class Sight:
         Forward matrices, from source to detector. [1/sr]
     caught : ndarray of int, shape (geometries, bounces)
         Paths or facets that joined source and detector.
+    glints, glints_caught
+        The part of both that met by luck, with nothing that asked for it.
+    foretold : ndarray, in the shape of brdf
+        Variance of that part, foretold from the paths that passed near. [1/sr^2]
     one : ndarray, shape (geometries, bounces)
         Largest M00 that a single path of strength 1 can have added. [1/sr]
     energy : ndarray, shape (wavelengths, N_ENERGIES)
@@ -102,6 +106,9 @@ class Sight:
 
     brdf: np.ndarray
     caught: np.ndarray
+    glints: np.ndarray
+    glints_caught: np.ndarray
+    foretold: np.ndarray
     one: np.ndarray
     energy: np.ndarray
     counts: np.ndarray
@@ -116,6 +123,9 @@ class Sums:
     look: Look
     brdf: np.ndarray = field(init=False)
     caught: np.ndarray = field(init=False)
+    glints: np.ndarray = field(init=False)
+    glints_caught: np.ndarray = field(init=False)
+    foretold: np.ndarray = field(init=False)
     one: np.ndarray = field(init=False)
     energy: np.ndarray = field(init=False)
     counts: np.ndarray = field(init=False)
@@ -127,6 +137,8 @@ class Sums:
         shape = self.look.shape
         self.brdf = np.zeros(shape)
         self.caught = np.zeros(shape[:2], dtype=np.int64)
+        self.glints, self.foretold = np.zeros(shape), np.zeros(shape)
+        self.glints_caught = np.zeros(shape[:2], dtype=np.int64)
         self.one = np.zeros(shape[:2])
         self.energy = np.zeros((shape[2], shading.N_ENERGIES))
         self.counts = np.zeros(shading.N_COUNTS, dtype=np.int64)

@@ -29,6 +29,9 @@ def look_at(surface: Field, look: Look, seed: np.random.SeedSequence) -> Sight:
     return Sight(
         brdf=sample.brdf,
         caught=sample.caught,
+        glints=sample.glints,
+        glints_caught=sample.glints_caught,
+        foretold=sample.foretold,
         one=sample.one,
         energy=sample.energy / sample.valued if sample.valued > 0 else unknown,
         counts=sample.counts,

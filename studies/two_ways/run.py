@@ -251,9 +251,6 @@ def agreement(seeds):
             z = cones.brdf.values - value
             z = z / np.maximum(np.hypot(noise, cones.brdf_stderr.values), 1e-300)
             seen = np.abs(value) > 0.02 * value[..., :1, :1]
-            # Both sides with enough paths for a normal distribution
-            seen &= (cones.paths.values > 60)[..., None, None]
-            seen &= noise[..., :1, :1] < 0.12 * value[..., :1, :1]
             for k, order in enumerate(scores):
                 scores[order].append(z[k][seen[k]])
         for order, parts in scores.items():

@@ -28,13 +28,12 @@ CONES = {"source_half_angle": 0.02, "detector_half_angle": 0.02}
 
 
 def scores(there, back):
-    """Differences in standard errors (bounces, geometry, 4, 4), where paths are many."""
+    """Differences in standard errors, and where (bounces, geometry, 4, 4) to look."""
     value = there.brdf.values[:, 0][:, THETA_BIN, DPHI_BIN]
     error = there.brdf_stderr.values[:, 0][:, THETA_BIN, DPHI_BIN]
-    # Few paths have skewed noise, and so has a polarised element far below M00
+    # A polarised element far below M00 has skewed noise
     size = np.abs(value) + np.abs(back.brdf.values)
-    seen = (back.paths.values > 60)[..., None, None] & (size > 0.02 * value[..., :1, :1])
-    seen &= error[..., :1, :1] < 0.12 * value[..., :1, :1]
+    seen = size > 0.02 * value[..., :1, :1]
     combined = np.hypot(error, back.brdf_stderr.values)[seen]
     return (back.brdf.values - value)[seen] / combined, seen
 
@@ -77,13 +76,12 @@ def test_both_ways_give_all_elements_by_bounces(hemisphere, name, estimator, sta
         realizations=48, phi_i="uniform", seed=2, estimator=estimator, start=start,
     )  # fmt: skip
     z, where = scores(hemisphere(name), seen)
-    # Elements of one geometry are correlated. Of 10 seeds a case the largest was 3.7, the
-    # rms 0.5 to 1.3
-    assert np.abs(z).max() < 5
-    assert 0.3 < np.sqrt(np.mean(z**2)) < 1.7
-    # Single and double bounces, and elements of every row and column
-    assert where[0].any(axis=0).sum() >= 10
-    assert where[1].any(axis=0).sum() >= 9
+    # Elements of one geometry are correlated. Of 10 seeds of 7 cases the largest was 3.6
+    assert np.abs(z).max() < 4.5
+    assert 0.5 < np.sqrt(np.mean(z**2)) < 1.5
+    # Every class of bounces, and elements of every row and column
+    assert (where.any(axis=1).sum(axis=(1, 2)) >= 9).all()
+    assert where[:2, :, 0, 0].all()
 
 
 def test_a_wrong_sign_is_seen(hemisphere):
