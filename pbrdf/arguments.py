@@ -1,6 +1,7 @@
 """Arguments of a run, checked once and turned into numbers."""
 
 import os
+from collections.abc import Iterable
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +19,6 @@ BATCHES = 32
 FEW_REALIZATIONS = 8
 # Half-angle of the widest source [rad]
 WIDEST_SOURCE = 0.5
-# Where a run towards a target error gives up
-MAX_SAMPLES = 4096
 
 
 def zeniths(theta_i: npt.ArrayLike) -> np.ndarray:
@@ -215,3 +214,22 @@ def varies(scene: Scene) -> bool:
     """Whether realisations of the scene differ."""
     drawn = any(getattr(one, "random", False) for one in scene.contaminants)
     return drawn or not isinstance(scene.surface, HeightMap)
+
+
+def in_range(name: str, value: float, low: float, high: float, cure: str) -> float:
+    """One number in [low, high]."""
+    number = require(
+        name, value, lambda v: (v >= low) & (v <= high), f"lie in [{low:g}, {high:g}]", cure
+    )
+    if number.ndim > 0:
+        msg = f"{name} must be one number, got shape {number.shape}."
+        raise ValueError(msg)
+    return float(number)
+
+
+def one_of(name: str, value: str, known: Iterable[str]) -> str:
+    """One of the known words."""
+    if value not in known:
+        msg = f"{name} must be one of {', '.join(known)}, got {value!r}."
+        raise ValueError(msg)
+    return value

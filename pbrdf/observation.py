@@ -7,7 +7,6 @@ goniometer, one by one, each with its finite source and detector.
 import warnings
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +15,7 @@ import xarray as xr
 import pbrdf
 from pbrdf import arguments
 from pbrdf.analytic.geometry import flat_geometry
-from pbrdf.errors import AccuracyWarning, require
+from pbrdf.errors import AccuracyWarning
 from pbrdf.readings import Readings, as_scan, to_dataset
 from pbrdf.results import scene_text
 from pbrdf.scene import Scene
@@ -24,7 +23,7 @@ from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.look import Look, Sight
 from pbrdf.tracer.observer import look_at
-from pbrdf.tracer.schedule import in_order
+from pbrdf.tracer.schedule import gather
 
 __all__ = ["ESTIMATORS", "as_scan", "observe"]
 
@@ -180,12 +179,12 @@ def observe(  # noqa: PLR0913  (the public signature)
         detector=detector,
         n_rays=-(-rays * drawn // samples) if batched else rays,
         max_bounces=arguments.count("max_bounces", max_bounces, 1),
-        estimator=_one_of("estimator", estimator, ESTIMATORS),
-        from_source=_one_of("start", start, ("detector", "source")) == "source",
-        hemisphere_samples=_in_range(
+        estimator=arguments.one_of("estimator", estimator, ESTIMATORS),
+        from_source=arguments.one_of("start", start, ("detector", "source")) == "source",
+        hemisphere_samples=arguments.in_range(
             "hemisphere_samples", hemisphere_samples, 0.1, 1e4, "2 is a good start."
         ),
-        sample_decay=_in_range(
+        sample_decay=arguments.in_range(
             "sample_decay", sample_decay, 0.01, 1.0, "1 keeps the sampling as it is."
         ),
         n=n,
@@ -218,15 +217,10 @@ def observe(  # noqa: PLR0913  (the public signature)
         draw = partial(_look_at_realization, surface, look)
 
     seen = Readings(look)
-    limit = samples if target is None else max(samples, arguments.MAX_SAMPLES)
-    # The order of samples, and so the result, is the same for any number of workers
-    for sight in in_order(draw, root, limit, arguments.worker_count(workers)):
-        seen.add(sight)
-        if progress is not None:
-            progress(seen.samples, samples if target is None else limit)
-        enough = seen.samples >= max(samples, 2)
-        if target is not None and enough and seen.rel_error() <= target:
-            break
+    gather(
+        draw, root, seen.add, seen.rel_error, samples=samples, target=target,
+        workers=arguments.worker_count(workers), progress=progress,
+    )  # fmt: skip
     return to_dataset(
         seen,
         wavelength=waves,
@@ -279,7 +273,9 @@ def _check_growth(samples: float, decay: float) -> None:
 
 
 def _half_angle(name: str, value: float, theta: np.ndarray) -> float:
-    half = _in_range(name, value, NARROW, 0.5, "Angles are radians; use np.deg2rad.")
+    half = arguments.in_range(
+        name, value, NARROW, 0.5, "Angles are radians; use np.deg2rad."
+    )
     if theta.max() + half > np.pi / 2:
         msg = (
             f"{name} must leave the cone above the horizon [rad], got {half:g} about "
@@ -287,20 +283,3 @@ def _half_angle(name: str, value: float, theta: np.ndarray) -> float:
         )
         raise ValueError(msg)
     return half
-
-
-def _in_range(name: str, value: float, low: float, high: float, cure: str) -> float:
-    number = require(
-        name, value, lambda v: (v >= low) & (v <= high), f"lie in [{low:g}, {high:g}]", cure
-    )
-    if number.ndim > 0:
-        msg = f"{name} must be one number, got shape {number.shape}."
-        raise ValueError(msg)
-    return float(number)
-
-
-def _one_of(name: str, value: str, known: Any) -> str:
-    if value not in known:
-        msg = f"{name} must be one of {', '.join(known)}, got {value!r}."
-        raise ValueError(msg)
-    return value

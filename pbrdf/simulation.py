@@ -17,7 +17,7 @@ from pbrdf.surface import HeightMap
 from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.plan import Moments, Plan, Tally
-from pbrdf.tracer.schedule import in_order
+from pbrdf.tracer.schedule import gather
 from pbrdf.tracer.skips import chosen_skips, explanation
 from pbrdf.tracer.trace import prepare, trace_sample
 from pbrdf.tracer.world import WetField, contaminant_materials, media_of
@@ -187,12 +187,18 @@ def simulate(  # noqa: PLR0913  (the public signature)
     else:
         draw = partial(_trace_realization, scene, plans, spare)
 
-    limit = samples if target is None else max(samples, arguments.MAX_SAMPLES)
-    moments = _gathered(
-        plans, in_order(draw, root, limit, arguments.worker_count(workers)), spare,
-        least=max(samples, 2), limit=limit, target=target, progress=progress,
+    moments = [Moments(one) for one in plans]
+
+    def add(tallies: Sequence[Tally]) -> None:
+        for one, tally in zip(moments, tallies, strict=True):
+            one.add(tally)
+            spare.append(tally.emptied())
+
+    done = gather(
+        draw, root, add, lambda: max(one.rel_error() for one in moments),
+        samples=samples, target=target, workers=arguments.worker_count(workers),
+        progress=progress,
     )  # fmt: skip
-    done = moments[0].samples
     for note in (late := _contamination_notes(moments[0], waves)):
         warnings.warn(note, AccuracyWarning, stacklevel=2)
     notes += late
@@ -219,31 +225,6 @@ def simulate(  # noqa: PLR0913  (the public signature)
             "warnings": notes,
         },
     )
-
-
-def _gathered(
-    plans: Sequence[Plan],
-    drawn: Iterable[Sequence[Tally]],
-    spare: deque[Tally],
-    *,
-    least: int,
-    limit: int,
-    target: float | None,
-    progress: Callable[[int, int], None] | None,
-) -> list[Moments]:
-    """Moments of each azimuth over samples, from `least` on only up to the target error."""
-    moments = [Moments(plan) for plan in plans]
-    for done, tallies in enumerate(drawn, start=1):
-        for one, tally in zip(moments, tallies, strict=True):
-            one.add(tally)
-            spare.append(tally.emptied())
-        if progress is not None:
-            progress(done, limit)
-        if target is None or done < least:
-            continue
-        if max(one.rel_error() for one in moments) <= target:
-            break
-    return moments
 
 
 def _contamination_notes(moments: Moments, waves: np.ndarray | None) -> list[str]:

@@ -90,12 +90,7 @@ def observe(
         Start,
         typer.Option(help="Where rays start; from the source long scans are quicker."),
     ] = Start.detector,
-    wavelength: Annotated[
-        str | None,
-        typer.Option(
-            "--wavelength-um", help="Wavelength, for a material given as a table."
-        ),
-    ] = None,
+    wavelength: options.Wavelengths = None,
     stokes: options.StokesOption = Stokes.full,
     seed: options.Seed = 0,
     workers: options.Workers = None,

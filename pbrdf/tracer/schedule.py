@@ -1,4 +1,4 @@
-"""Samples computed by threads, handed on in their order."""
+"""Samples computed by threads and taken in their order, until there are enough."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -8,6 +8,35 @@ from typing import TypeVar
 import numpy as np
 
 T = TypeVar("T")
+# Where a run towards a target error gives up
+MOST_SAMPLES = 4096
+
+
+def gather(
+    draw: Callable[[np.random.SeedSequence], T],
+    root: np.random.SeedSequence,
+    add: Callable[[T], None],
+    rel_error: Callable[[], float],
+    *,
+    samples: int,
+    target: float | None,
+    workers: int,
+    progress: Callable[[int, int], None] | None,
+) -> int:
+    """Draw samples and add them; with a target until the relative error falls to it.
+
+    Returns their number: `samples`, or from so many on the first that meets the target.
+    The order of samples, and so the result, is the same for any number of workers.
+    """
+    limit = samples if target is None else max(samples, MOST_SAMPLES)
+    for done, sample in enumerate(in_order(draw, root, limit, workers), start=1):
+        add(sample)
+        if progress is not None:
+            progress(done, limit)
+        # One sample alone has no error
+        if target is not None and done >= max(samples, 2) and rel_error() <= target:
+            return done
+    return limit
 
 
 def in_order(

@@ -10,22 +10,12 @@ import numpy as np
 import pytest
 
 from pbrdf.cli import main
+from tests.cli.scenes import SCENE
 
 PROFILE = "x_um,z_um\n" + "".join(f"{x},{np.sin(x / 3):.6f}\n" for x in range(60))
 SCAN = "theta_i_deg,theta_view_deg,M00,M10\n" + "".join(
     f"30,{view},{0.05 + 1e-4 * view},{0.01}\n" for view in range(-70, 75, 10)
 )
-SCENE = """
-[surface]
-type = "gaussian"
-shape = [32, 32]
-spacing_um = 1.0
-corr_length_um = 6.0
-slope_rms = 0.2
-
-[substrate]
-n = 1.5
-"""
 
 
 @pytest.fixture

@@ -8,18 +8,8 @@ from numpy.testing import assert_allclose
 
 from data_io import read_goniometer, read_result
 from pbrdf.cli import main
+from tests.cli.scenes import SCENE
 
-SCENE = """
-[surface]
-type = "gaussian"
-shape = [32, 32]
-spacing_um = 1.0
-corr_length_um = 6.0
-slope_rms = 0.2
-
-[substrate]
-n = 1.5
-"""
 # One geometry at two wavelengths, and one out of the plane
 SCAN = """theta_i_deg,theta_s_deg,dphi_deg,wavelength_um,M00
 30,30,180,0.5,0.5
