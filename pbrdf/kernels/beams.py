@@ -22,9 +22,11 @@ FREE, ON_GROUND, ON_FILM, ON_BODY = 0, 1, 2, 3
 NOTHING = -1.0
 FILM = -5.0  # the number of the film among the bodies a beam is inside of
 
-# Room to work in: the stack (events + 2, N_STATE), and what the next event is. Every event
-# leaves at most one part behind, so a stack of two rows more than events is never full.
-Room = namedtuple("Room", "state hit")
+# Room to work in: the stack (events + 2, N_STATE), what the next event is, and the first
+# facets of the rays of a line as `sweep_line` finds them, of no size where every ray is
+# followed from its start. Every event leaves at most one part behind, so a stack of two
+# rows more than events is never full.
+Room = namedtuple("Room", "state hit meetings")
 
 
 @jit(forceinline=True)

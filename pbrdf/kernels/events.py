@@ -59,6 +59,7 @@ from pbrdf.kernels.heightfield import (
 )
 from pbrdf.kernels.horizon import is_free
 from pbrdf.kernels.interfaces import GRAZING
+from pbrdf.kernels.sweep import F_FACET, F_I, F_J, F_U, F_V, F_Z
 
 MAX_STEPS = 10_000_000
 NO_FILM, CONFORMAL, LEVEL = 0, 1, 2
@@ -143,13 +144,13 @@ def next_facet(terrain, state, top, start, lift, flip, t_limit, hit):
 
 
 @jit(forceinline=True)
-def next_surface(world, state, top, hit):
-    """Surface of a body, or plane of a level film, that the beam meets next."""
+def next_surface(world, state, top, t_limit, hit):
+    """Surface of a body, or plane of a level film, that the beam meets before t_limit."""
     film, bodies = world.film, world.bodies
     x, y, z = state[top, X], state[top, Y], state[top, Z]
     k_x, k_y, k_z = state[top, KX], state[top, KY], state[top, KZ]
     kind = OUT
-    t = FAR
+    t = t_limit
     bodies_inside = 0
     in_film = False
     # The way out of every body that holds the beam
@@ -195,7 +196,7 @@ def next_surface(world, state, top, hit):
 def next_event(world, state, top, hit):
     """Find what the beam meets next; where and how far away is written into `hit`."""
     terrain, film = world.terrain, world.film
-    kind, in_film = next_surface(world, state, top, hit)
+    kind, in_film = next_surface(world, state, top, FAR, hit)
     if kind == ASTRAY:
         return ASTRAY
     fate = ESCAPED
@@ -219,6 +220,24 @@ def next_event(world, state, top, hit):
         if fate == LOST or state[top, N_INSIDE] > 0:
             return ASTRAY
     return kind
+
+
+@jit(forceinline=True)
+def first_event(world, state, meeting, hit):
+    """`next_event` of a ray from above, whose first facet `sweep_line` has found."""
+    film = world.film
+    conformal = film.kind == CONFORMAL
+    z = meeting[F_Z] + (film.height if conformal else 0.0)
+    kind, _ = next_surface(world, state, 0, (state[0, Z] - z) / -state[0, KZ], hit)
+    if kind != OUT:
+        return kind
+    hit[HIT_I] = meeting[F_I]
+    hit[HIT_J] = meeting[F_J]
+    hit[HIT_FACET] = meeting[F_FACET]
+    hit[HIT_U] = meeting[F_U]
+    hit[HIT_V] = meeting[F_V]
+    hit[HIT_Z] = z
+    return FILM_DOWN if conformal else GROUND
 
 
 @jit(forceinline=True)

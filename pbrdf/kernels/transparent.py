@@ -28,7 +28,15 @@ from pbrdf.kernels.beams import (
 from pbrdf.kernels.binning import bin_of_direction
 from pbrdf.kernels.bodies import HIT_T
 from pbrdf.kernels.entry import entry_line, first_ray, line_beam, wrap_into
-from pbrdf.kernels.events import ASIDE, ASTRAY, OUT, move_beam, next_event
+from pbrdf.kernels.events import (
+    ASIDE,
+    ASTRAY,
+    CONFORMAL,
+    OUT,
+    first_event,
+    move_beam,
+    next_event,
+)
 from pbrdf.kernels.interfaces import turn_columns
 from pbrdf.kernels.shading import (
     LEAKED,
@@ -50,6 +58,7 @@ from pbrdf.kernels.splitting import (
     solid_at,
     survives,
 )
+from pbrdf.kernels.sweep import sweep_line
 from pbrdf.kernels.transport import exit_turn
 
 MAX_STEPS = 10_000_000  # of one ray with all its parts
@@ -121,11 +130,11 @@ def launch_beam(state, x, y, z, beam, columns):
 
 @jit(forceinline=True)
 def follow_beam(
-    world, w, top, stream, number, step, cos_phi, sin_phi, max_events, columns, room, tally
+    world, w, top, kind, stream, number, step, cos_phi, sin_phi, max_events, columns, room,
+    tally,
 ):  # fmt: skip
     """Take the beam at the top of the stack to its next event; returns the new top."""
     state, hit = room.state, room.hit
-    kind = next_event(world, state, top, hit)
     if kind < OUT:
         absorb_on_the_way(world, w, state, top, columns, hit[HIT_T], tally.energy)
     if kind >= OUT or state[top, EVENTS] >= max_events:
@@ -153,14 +162,19 @@ def follow_beam(
 
 @jit(forceinline=True)
 def trace_beams(
-    world, w, number, source, cos_phi, sin_phi, max_events, columns, room, tally
+    world, w, number, ray, source, cos_phi, sin_phi, max_events, columns, room, tally
 ):  # fmt: skip
-    """Follow one ray and all its parts until their light has left or is lost."""
+    """Follow one ray of a line and all its parts until their light has left or is lost."""
+    swept = room.meetings.size > 0
     top = 0
     step = 0
     while top >= 0:
+        if step == 0 and swept:
+            kind = first_event(world, room.state, room.meetings[ray], room.hit)
+        else:
+            kind = next_event(world, room.state, top, room.hit)
         top = follow_beam(
-            world, w, top, source.stream, number, step, cos_phi, sin_phi, max_events,
+            world, w, top, kind, source.stream, number, step, cos_phi, sin_phi, max_events,
             columns, room, tally,
         )  # fmt: skip
         step += 1
@@ -183,6 +197,9 @@ def trace_among_bodies(world, source, z_start, max_events, columns, room, tally)
             entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
         )
         beam = line_beam(line, source)
+        if room.meetings.size > 0:
+            lift = world.film.height if world.film.kind == CONFORMAL else 0.0
+            sweep_line(terrain, line, source, z_start - lift, room.meetings)
         first = first_ray(line, source)
         rays = first_ray(line + 1, source) - first
         for ray in range(rays):
@@ -195,6 +212,6 @@ def trace_among_bodies(world, source, z_start, max_events, columns, room, tally)
                     beam, columns,
                 )  # fmt: skip
                 trace_beams(
-                    world, w, first + ray, source, cos_phi, sin_phi, max_events,
+                    world, w, first + ray, ray, source, cos_phi, sin_phi, max_events,
                     columns, room, tally,
                 )  # fmt: skip

@@ -48,7 +48,7 @@ def explanation(plan: Plan, *, periodic: bool, steepest: float) -> list[str]:
         Largest slope of a facet of one sample of the surface. [1]
     """
     if plan.media is not None:
-        lines = _about_contaminants(plan, steepest)
+        lines = _about_contaminants(plan, periodic, steepest)
     elif "walk" in plan.skips:
         lines = _about_the_walk(plan.skips, periodic, steepest)
     else:
@@ -73,13 +73,17 @@ def explanation(plan: Plan, *, periodic: bool, steepest: float) -> list[str]:
     return lines
 
 
-def _about_contaminants(plan: Plan, steepest: float) -> list[str]:
+def _about_contaminants(plan: Plan, periodic: bool, steepest: float) -> list[str]:
     assert plan.media is not None
     lines = [
         "Embree: not built; bodies are met exactly, by a grid, and the ground by a walk.",
         "Parts of a split ray below a hundredth of it: one of the two is followed, by "
         "chance; below a thousandth, by chance or not at all.",
     ]
+    if "sweep" in plan.skips and periodic:
+        lines.append(
+            "Search for the first facets: none; one pass along each line finds them."
+        )
     if "steep" in plan.skips:
         lines.append(
             "The ground, for rays rising above its steepest facet in the first sample, a "

@@ -11,6 +11,7 @@ from pbrdf.kernels.entry import Source
 from pbrdf.kernels.events import N_HIT
 from pbrdf.kernels.horizon import NO_HORIZON
 from pbrdf.kernels.spectra import shade_gathered
+from pbrdf.kernels.sweep import N_FIRST
 from pbrdf.kernels.transparent import trace_among_bodies
 from pbrdf.kernels.transport import N_WAITING, sweep_batch, trace_batch
 from pbrdf.surface.heightmap import HeightMap
@@ -71,7 +72,12 @@ def trace_sample(
             np.zeros((4, 4)),
         )  # fmt: skip
         if isinstance(target, WetField):
-            places = Room(np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT))
+            sweeps = field.periodic and "sweep" in plan.skips
+            longest = -(-source.n_rays // source.n_lines) if sweeps else 0
+            places = Room(
+                np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT),
+                np.empty((longest, N_FIRST)),
+            )  # fmt: skip
             trace_among_bodies(
                 target.world, source, field.terrain.z_top, plan.max_bounces,
                 plan.n_stokes, places, bins,

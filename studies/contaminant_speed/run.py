@@ -14,7 +14,8 @@ from pbrdf.kernels import jit, shading
 from pbrdf.kernels.beams import KX, KY, KZ, N_STATE, Room, X, Y, Z
 from pbrdf.kernels.binning import bin_edges
 from pbrdf.kernels.entry import Source, entry_line, first_ray, line_beam, wrap_into
-from pbrdf.kernels.events import N_HIT
+from pbrdf.kernels.events import N_HIT, next_event
+from pbrdf.kernels.sweep import N_FIRST
 from pbrdf.kernels.transparent import follow_beam, launch_beam
 from pbrdf.surface.bodies import place
 from pbrdf.tracer.mesh import build_mesh
@@ -55,8 +56,9 @@ def record_segments(world, source, z_start, room, tally, segments):
                     segments[count, column] = room.state[top, X + column]
                     segments[count, 3 + column] = room.state[top, KX + column]
                 count += 1
+                kind = next_event(world, room.state, top, room.hit)
                 top = follow_beam(
-                    world, 0, top, source.stream, first + ray, step, cos_phi, sin_phi,
+                    world, 0, top, kind, source.stream, first + ray, step, cos_phi, sin_phi,
                     1024, 4, room, tally,
                 )  # fmt: skip
                 step += 1
@@ -75,7 +77,7 @@ def segments_of(wet, theta, n_rays):
         wet.field.entry_lines(launch, n_rays), n_rays, np.array([0.2, 0.5, 0.7]),
         np.uint64(5),
     )  # fmt: skip
-    room = Room(np.empty((1026, N_STATE)), np.zeros(N_HIT))
+    room = Room(np.empty((1026, N_STATE)), np.zeros(N_HIT), np.empty((0, N_FIRST)))
     segments = np.empty((20 * n_rays, 6))
     top = wet.field.terrain.z_top
     count = record_segments(wet.world, source, top, room, tally, segments)
