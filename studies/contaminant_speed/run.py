@@ -115,9 +115,9 @@ def embree_scene(field, bodies):
     for k in range(len(bodies)):
         points, faces = turned(bodies.shape(k))
         place_of = np.array([bodies.x[k], bodies.y[k], bodies.z[k]])
-        vertices = (points + place_of - origin) / frame.unit
+        vertices = (points + place_of - origin) * frame.scale_z
         TriangleMesh(scene, vertices.astype(np.float32), faces.astype(np.int32))
-    return scene, origin, frame.unit
+    return scene, origin, frame.scale_z
 
 
 def seconds(work, repeats=3):
@@ -152,7 +152,7 @@ def against_embree(n_rays):
         )  # fmt: skip
         wet = WetField.of(field, surface, [drops], media, SEED)
         bodies = place([drops], surface, SEED).bodies
-        scene, origin, unit = embree_scene(field, bodies)
+        scene, origin, scale = embree_scene(field, bodies)
         for degrees in (30, 60):
             theta = np.deg2rad(degrees)
             segments = segments_of(wet, theta, n_rays)
@@ -160,7 +160,7 @@ def against_embree(n_rays):
             tally = trace_sample(wet, plan, SEED)
             counted = int(tally.counts[0, shading.N_SEGMENTS])
             engine = seconds(lambda plan=plan, wet=wet: trace_sample(wet, plan, SEED))
-            starts = ((segments[:, :3] - origin) / unit).astype(np.float32)
+            starts = ((segments[:, :3] - origin) * scale).astype(np.float32)
             directions = segments[:, 3:].astype(np.float32)
             chunks = [slice(k, k + 32768) for k in range(0, len(starts), 32768)]
 
