@@ -93,6 +93,11 @@ def main():
         rows.reference_se.to_numpy(),
     )
     print(f"seeds with a number beyond 5: {(np.abs(deviation).max(axis=1) > 5).mean():.3f}")
+    stated = (values - rows.reference.to_numpy()) / np.hypot(errors, rows.reference_se)
+    worst = np.abs(stated).max(axis=1)
+    print(
+        f"with the stated errors alone: {(worst > 5).mean():.3f}, largest {worst.max():.1f}"
+    )
     mean_error = values.std(axis=0, ddof=1) / np.sqrt(len(values))
     of_mean = (values.mean(axis=0) - rows.reference) / np.hypot(
         mean_error, rows.reference_se
