@@ -15,7 +15,6 @@ FOLDER = Path(__file__).parent / "reference"
 SLOPE, INDEX, THETA_DEG = 0.15, 1.5, (10.0, 41.4, 60.0)
 N_THETA, N_DPHI = 18, 36
 LEAST_SIGNAL = 20.0
-REFERENCE_RAYS = 135_840_000
 BOUNCES = {"b1": "1", "b2": "2", "b3p": "3+"}
 ALBEDO = {"b1": "1", "b2": "2", "b3plus": "3+"}
 
@@ -76,23 +75,11 @@ def _albedo_rows(result):
         yield frame
 
 
-def own_error(rows, rays):
-    """Standard error of the simulated numbers: as stated, or as the reference foretells.
-
-    Where the run can expect only a few rays in a bin, their spread says little, and
-    nothing if none came. There the error follows from the variance of the reference's rays.
-    """
-    foretold = rows.reference_se * np.sqrt(REFERENCE_RAYS / rays)
-    few = foretold > 0.2 * rows.reference.abs()
-    return np.where(few, np.maximum(rows.stderr, foretold), rows.stderr)
-
-
 def compare(result):
     """One row a bin and quantity: reference, value, both standard errors and z."""
     rows = pd.concat([*_bin_rows(result), *_albedo_rows(result)], ignore_index=True)
     rows = rows[np.abs(rows.reference) > LEAST_SIGNAL * rows.reference_se].copy()
-    error = own_error(rows, result.attrs["rays_per_direction"])
-    rows["z"] = (rows.value - rows.reference) / np.hypot(error, rows.reference_se)
+    rows["z"] = (rows.value - rows.reference) / np.hypot(rows.stderr, rows.reference_se)
     return rows.reset_index(drop=True)
 
 
