@@ -56,9 +56,10 @@ Bundle = namedtuple(
 )
 # How to look: COUNT every ray that meets the cone of the source; or SHARE what the mirrored
 # cone shares with it, from paths of `first` bounces on; or FAR_END, the paths from the
-# source that a base sends to the detector and that were mirrored before. Then samples of
-# the hemisphere, their decay with each bounce, and the cone of one sample
-Rule = namedtuple("Rule", "kind first samples decay cos_spread sin_spread")
+# source that a base sends to the detector and that were mirrored before. Whether SHARE
+# counts paths of mirrors too; then samples of the hemisphere, their decay with each bounce,
+# and the cone of one sample
+Rule = namedtuple("Rule", "kind first counts samples decay cos_spread sin_spread")
 COUNT, SHARE, FAR_END = 0, 1, 2
 # Columns of a target: sine and cosine of zenith, of azimuth from the bundle, of half-angle,
 # cosine of the angle within which a path was near, and the mean square of what it adds then
@@ -262,7 +263,7 @@ def follow_bundle(
                         )  # fmt: skip
                     continue
                 share = 1.0 if along >= targets[target, T_COS_HALF] else 0.0
-                if rule.kind != COUNT:
+                if not rule.counts:
                     along = (
                         e_x * axes[target, A_X] + e_y * axes[target, A_Y]
                         + e_z * axes[target, A_Z]

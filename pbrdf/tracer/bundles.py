@@ -4,7 +4,7 @@ import numpy as np
 
 from pbrdf.kernels import observe_paths, shading
 from pbrdf.kernels.observe_lens import cap_flux, lens_flux
-from pbrdf.kernels.observe_paths import COUNT, FAR_END, Bundle, Rule
+from pbrdf.kernels.observe_paths import FAR_END, Bundle, Rule
 from pbrdf.kernels.observe_record import ALL, FORETOLD, GLINTS, N_AXES, Catch
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.look import Sums, forward
@@ -43,10 +43,10 @@ def send_bundles(
 
     cos_spread = max(1.0 - 1.0 / look.hemisphere_samples, np.cos(WIDEST_SAMPLE))
     rule = Rule(
-        kind, first, float(look.hemisphere_samples), float(look.sample_decay), cos_spread,
-        np.sqrt(1.0 - cos_spread**2),
+        kind, first, look.counts, float(look.hemisphere_samples), float(look.sample_decay),
+        cos_spread, np.sqrt(1.0 - cos_spread**2),
     )  # fmt: skip
-    reach, chance = near_misses(half_here, half_there, counting=kind == COUNT)
+    reach, chance = near_misses(half_here, half_there, counting=look.counts)
     record = np.empty((look.max_bounces + 1, 1, shading.N_RECORD))
     hits = np.empty((look.max_bounces, observe_paths.N_HIT))
     shape = look.shape[1:]

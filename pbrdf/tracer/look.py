@@ -28,6 +28,9 @@ class Look:
         Bundles a geometry and sample, and where their paths are cut.
     estimator : str
         One of `pbrdf.observation.ESTIMATORS`.
+    counts : bool
+        Whether paths of mirrors count if their ray meets the cone, or by what the cone that
+        it stands for shares with it.
     from_source : bool
         Bundles start at the source and serve all detectors.
     hemisphere_samples, sample_decay : float
@@ -46,6 +49,7 @@ class Look:
     n_rays: int
     max_bounces: int
     estimator: str
+    counts: bool
     from_source: bool
     hemisphere_samples: float
     sample_decay: float

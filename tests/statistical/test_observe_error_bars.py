@@ -106,6 +106,35 @@ def test_sampling_of_the_hemisphere_changes_the_noise_only(knobs):
     assert (clever.brdf_stderr[2, :, 0, 0] < 0.2 * clever.brdf[2, :, 0, 0]).all()
 
 
+def test_only_corner_rays_lose_second_bounces_in_wide_cones():
+    """Other directions of a wide cone meet other facets than its ray; counting knows."""
+    steep = GaussianSurface(shape=(96, 96), spacing=1.0, corr_length=8.0, slope_rms=0.4)
+    scene = Scene(HeightMap(steep.sample(3).heights, 1.0, periodic=True), Material(3.0))
+    options = {
+        "source_half_angle": 0.2, "detector_half_angle": 0.2, "phi_i": "uniform",
+        "start": "source", "stokes": "unpolarized", "max_bounces": 2,
+    }  # fmt: skip
+    seen = {
+        name: observe(
+            scene, 0.7, 0.7, np.pi, n_rays=n_rays, estimator=name, seed=seed, **options
+        )
+        for seed, (name, n_rays) in enumerate({"count": 800_000, "paths": 400_000}.items())
+    }
+    with pytest.warns(UserWarning, match="multiple bounces lose"):
+        seen["corners"] = observe(
+            scene, 0.7, 0.7, np.pi, n_rays=400_000, estimator="corners", seed=2, **options
+        )
+    value = {name: run.brdf[1].item() for name, run in seen.items()}
+    error = {name: run.brdf_stderr[1].item() for name, run in seen.items()}
+    noise = np.hypot(error["count"], error["paths"])
+    assert noise < 0.025 * value["count"]
+    assert abs(value["paths"] - value["count"]) < 3.5 * noise
+    # They lose some 13 % here
+    assert value["corners"] < value["count"] - 3.5 * np.hypot(
+        error["count"], error["corners"]
+    )
+
+
 def test_a_wide_cone_is_called_wide():
     options = {"n_rays": 320, "realizations": 8, "max_bounces": 1}
     with pytest.warns(UserWarning, match="wide beside the rms slope"):
