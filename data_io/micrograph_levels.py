@@ -11,6 +11,8 @@ from pbrdf.errors import DataFileError
 
 # Smallest picture that can hold an edge worth statistics. [pixels]
 MIN_COLUMNS, MIN_ROWS = 32, 16
+# Pixels nearer to the border than this tell no level; beyond lie 0.02 % of a Gaussian
+RIM_BLURS = 3.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,7 +175,7 @@ def flatten(grey: np.ndarray) -> Levels | None:
     fits = [
         fit
         for start in starts
-        if (fit := _fit_levels(few, smooth, start, basis, 3.0 / step)) is not None
+        if (fit := _fit_levels(few, smooth, start, basis, step)) is not None
     ]
     if not fits:
         return None
@@ -227,7 +229,7 @@ def _fit_levels(
     smooth: np.ndarray,
     threshold: np.ndarray,
     basis: np.ndarray,
-    rim: float,
+    step: int,
 ) -> tuple[np.ndarray, np.ndarray, float] | None:
     """Return terms of the dark and the bright level, and how much they explain."""
     terms = [np.zeros(basis.shape[-1])] * 2
@@ -235,9 +237,7 @@ def _fit_levels(
     previous = None
     for _ in range(12):
         mask = smooth > threshold
-        # Pixels near the border are a mixture of both classes
-        inside = ndimage.gaussian_filter(mask.astype(float), max(rim, 0.7), truncate=2.0)
-        classes = [inside < 0.02, inside > 0.98]
+        classes = _classes(mask, smooth, step)
         if min(np.count_nonzero(c) for c in classes) < 30:
             return None
         terms = [_robust_fit(basis[c], grey[c]) for c in classes]
@@ -251,6 +251,35 @@ def _fit_levels(
     model = np.where(smooth > threshold, bright, dark)
     explained = 1 - np.mean((smooth - model) ** 2) / np.var(smooth)
     return terms[0], terms[1], float(explained)
+
+
+def _classes(mask: np.ndarray, smooth: np.ndarray, step: int) -> list[np.ndarray]:
+    """Return the dark and the bright pixels that the blurred border does not reach.
+
+    What it leaves in them, 2 % at two blurs, bends a level and with it the scale of heights.
+    Where phases are too thin to keep so far away, six pixels must do.
+    """
+    rims = [max(RIM_BLURS * _border_width(mask, smooth), 6.0 / step), 6.0 / step]
+    for rim in rims:
+        # A Gaussian cut at two widths ends as a whole at the rim
+        inside = ndimage.gaussian_filter(
+            mask.astype(float), max(rim / 2, 0.7), truncate=2.0
+        )
+        classes = [inside < 0.02, inside > 0.98]
+        if min(np.count_nonzero(c) for c in classes) > 0.1 * mask.size:
+            break
+    return classes
+
+
+def _border_width(mask: np.ndarray, smooth: np.ndarray) -> float:
+    """Standard deviation of the blur across the border, smoothing included. [samples]"""
+    border = mask ^ ndimage.binary_erosion(mask, border_value=1)
+    if not border.any():
+        return 0.0
+    contrast = np.median(smooth[mask]) - np.median(smooth[~mask])
+    steepness = np.median(np.hypot(*np.gradient(smooth))[border])
+    # A Gaussian step of width s has the steepest slope contrast / (s sqrt(2 pi))
+    return float(contrast / np.sqrt(2 * np.pi) / max(steepness, 1e-9))
 
 
 def _robust_fit(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
