@@ -131,10 +131,12 @@ def _step(
     scaled: np.ndarray, distance: np.ndarray, within: np.ndarray, slope: np.ndarray
 ) -> tuple[float, np.ndarray]:
     """Return the width of the mean step, and each column's likeness to it."""
-    gentle = slope < np.quantile(slope, 0.9) + 1e-9
+    half = within.sum(axis=0) / 2
+    # Dust narrows single windows
+    gentle = (slope < np.quantile(slope, 0.9) + 1e-9) & (half >= np.quantile(half, 0.1))
     # A pixel's grain shifts the edge by as much: at the window's ends, where no neighbour
     # makes up for it, the bright bins are too bright and the dark ones too dark
-    reach = max(within[:, gentle].sum(axis=0).min() / 2 - 2, 2.0)
+    reach = max(float(half[gentle].min()) - 2, 2.0)
     bins = np.arange(-reach, reach + 0.01, 0.25)
     d, s = distance[:, gentle], scaled[:, gentle]
     count = np.histogram(d, bins)[0]
@@ -156,7 +158,7 @@ def _step(
     # Strong grain needs more columns for a verdict, and is not the same everywhere
     columns = int(np.clip(np.ceil(grain / 0.004), 1, 61))
     local = np.minimum(ndimage.uniform_filter1d(beyond, max(columns, 9)), 2 * grain)
-    n = within.sum(axis=0)
+    n = 2 * half
     excess = np.where(within, residual, 0).sum(axis=0) - n * local
     mean_model = np.where(within, model, 0).sum(axis=0) / n
     spread = np.where(within, (model - mean_model) ** 2, 0).sum(axis=0)

@@ -19,6 +19,32 @@ OUTLYING = 12.0
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
+class LocatedEdge(Profile):
+    """An edge as it was located, with blur and grain in it.
+
+    Parameters
+    ----------
+    x, z : ndarray, shape (m,)
+        Positions, one a clear column, and heights, tilt removed. [um]
+    blur : float
+        Standard deviation of the camera's blur along x. [um]
+    grain : ndarray, shape (k,)
+        Autocorrelation of the heights' noise at 0, 1, 2 ... columns, up to where it cannot
+        be told from none. [1]
+    """
+
+    blur: float
+    grain: np.ndarray
+
+    def __init__(
+        self, x: npt.ArrayLike, z: npt.ArrayLike, blur: float, grain: np.ndarray
+    ) -> None:
+        super().__init__(x, z)
+        object.__setattr__(self, "blur", blur)
+        object.__setattr__(self, "grain", grain)
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class EdgeProfile(Profile):
     """A profile read from a picture, with what is known of its making.
 
@@ -31,6 +57,8 @@ class EdgeProfile(Profile):
     overhang : ndarray of bool, shape (n,)
         True where the material overhangs: the outermost border is taken there, as seen
         along the normal.
+    located : LocatedEdge or None
+        The edge before restoration, for statistics; None with restoring=False.
     pixels : ndarray, shape (m, 2)
         Row and column of the edge in the picture before restoration; pixel centres are
         whole numbers. [pixels]
@@ -58,6 +86,7 @@ class EdgeProfile(Profile):
 
     quality: np.ndarray
     overhang: np.ndarray
+    located: LocatedEdge | None
     pixels: np.ndarray
     um_per_pixel: float
     threshold: float
@@ -98,6 +127,7 @@ def edge_profile(
     slope, level = np.polyfit(column, height, 1)
     tilt = float(np.arctan(slope))
     restored = restore(height - (slope * column + level), trace.grain, trace.step_width)
+    located = _located(trace, good, tilt, restored.blur, scale) if restoring else None
     if restoring:
         height = restored.height + slope * column + level
     # Turn the points about the first one; then read them at even steps
@@ -114,6 +144,7 @@ def edge_profile(
         (z[keep] - z[keep].mean()) * scale,
         quality=quality[keep],
         overhang=trace.overhang[forward][nearest][keep],
+        located=located,
         pixels=pixels,
         blur=restored.blur * scale,
         noise_rms=restored.noise_rms * scale,
@@ -123,6 +154,35 @@ def edge_profile(
         warnings=_remarks(trace, restored, restoring, good),
         **details,
     )
+
+
+def _located(
+    trace: Trace, good: np.ndarray, tilt: float, blur: float, scale: float
+) -> LocatedEdge:
+    """Turn the clear columns by shearing, which leaves them even and their noise alone.
+
+    A turned edge differs by a displacement of its heights' own size times sin(tilt): at 5
+    degrees and a slope rms of 0.25 that is 0.1 % of the slope.
+    """
+    column = trace.columns[good].astype(float)
+    slope, level = np.polyfit(column, trace.height[good], 1)
+    normal = (trace.height[good] - slope * column - level) * np.cos(tilt)
+    step = scale / np.cos(tilt)
+    return LocatedEdge(
+        (column - column[0]) * step, normal * scale, blur * step, _grain_correlation(trace)
+    )
+
+
+def _grain_correlation(trace: Trace) -> np.ndarray:
+    """Autocorrelation of the noise beside the edge, up to where it is lost in its own."""
+    grain = trace.grain - trace.grain.mean(axis=1, keepdims=True)
+    n = grain.shape[1]
+    power = (np.abs(np.fft.rfft(grain, 2 * n, axis=1)) ** 2).sum(axis=0)
+    found = np.fft.irfft(power)[: n // 4]
+    found = found / found[0]
+    # Of white noise it scatters by 1 / sqrt(2 n)
+    small = np.flatnonzero(found < 2 / np.sqrt(2 * n))
+    return found[: int(small[0]) if small.size else found.size]
 
 
 def _clear(quality: np.ndarray) -> np.ndarray:

@@ -3,13 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import fft, ndimage
+from scipy import fft, ndimage, special
 
 # Frequencies are given up where blur leaves less than this part of an amplitude ...
 MIN_TRANSFER = 0.2
-# ... or where the spectrum no longer exceeds the noise by this many standard errors
+# ... or where the spectrum no longer exceeds the noise by this many standard errors ...
 MIN_SIGNIFICANCE = 4.0
 MIN_SIGNAL_TO_NOISE = 0.3
+# ... in one piece with what noise of that strength exceeds in so few cases
+MAX_FALSE_ALARM = 1e-5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,8 +68,7 @@ def restore(height: np.ndarray, grain: np.ndarray, step_width: float) -> Restore
     grain_power = (
         fft.dct(grain - grain.mean(axis=1, keepdims=True), norm="ortho", axis=1) ** 2
     )
-    # Grain has a broad spectrum: a wide window makes its estimate sure
-    noise = ndimage.uniform_filter1d(grain_power.mean(axis=0), max(n // 12, 16))
+    noise = ndimage.uniform_filter1d(grain_power.mean(axis=0), _noise_window(n))
     noise = noise * _excess(power, noise, wavenumber, step_width)
     noise = np.minimum(noise, power)
     noise_rms = float(np.sqrt(noise.mean()))
@@ -102,14 +103,35 @@ def _gain(
 ) -> np.ndarray:
     """Return sqrt(1 - N / P) / G up to the last wavenumber that stands out of the noise."""
     transfer = np.exp(-((wavenumber * blur) ** 2) / 2)
-    # A squared cosine amplitude has twice its mean as variance
-    scatter = np.sqrt(2 / (1 + 2 * _half_window(power.size)))
-    least = 1 + MIN_SIGNAL_TO_NOISE + MIN_SIGNIFICANCE * scatter
-    clear = (transfer > MIN_TRANSFER) & (power > least * noise)
-    last = int(np.flatnonzero(clear)[-1]) if clear.any() else 0
-    usable = np.arange(power.size) <= last
+    usable = np.arange(power.size) <= _last_clear(power, noise, transfer > MIN_TRANSFER)
     share = np.clip(1 - noise / np.maximum(power, 1e-300), 0, 1)
     return np.where(usable, np.sqrt(share) / np.maximum(transfer, MIN_TRANSFER), 0.0)
+
+
+def _last_clear(power: np.ndarray, noise: np.ndarray, seen: np.ndarray) -> int:
+    """Index of the last wavenumber, among those seen, that stands out of the noise.
+
+    Noise alone does so somewhere in one picture of six, as both spectra are averages of few
+    squares: a stretch counts only if a part of it exceeds what their ratio, distributed as
+    F, would reach by chance.
+    """
+    n = power.size
+    index, half = np.arange(n), _half_window(n)
+    count = np.minimum(index + half + 1, n) - np.maximum(index - half, 0)
+    # A squared cosine amplitude has twice its mean as variance
+    scatter = np.sqrt(2 / (1 + 2 * half))
+    strength = power / np.maximum(noise, 1e-300)
+    clear = strength > 1 + MIN_SIGNAL_TO_NOISE + MIN_SIGNIFICANCE * scatter
+    chance = special.fdtri(count, 2 * _noise_window(n), 1 - MAX_FALSE_ALARM)
+    sure = clear & (strength > (1 + MIN_SIGNAL_TO_NOISE) * chance)
+    stretches, _ = ndimage.label(clear & seen)
+    kept = np.isin(stretches, stretches[sure & seen])
+    return int(np.flatnonzero(kept)[-1]) if kept.any() else 0
+
+
+def _noise_window(n: int) -> int:
+    """Wavenumbers in an average of the noise: its spectrum is broad, so they are many."""
+    return max(n // 12, 16)
 
 
 def _excess(

@@ -51,14 +51,21 @@ def find_drop(grey: np.ndarray, baseline: np.ndarray | None) -> DropContour | No
     if bright.all() or not bright.any():
         return None
     low, high = np.median(few[~bright]), np.median(few[bright])
-    contrast, level = high - low, (low + high) / 2
-    if contrast < 0.02:
+    if high - low < 0.02:
         return None
+    light = _light(few, bright, high)
     # A lamp may light only a part of a large picture
     rows, columns = (np.flatnonzero(bright.any(axis=axis)) * step for axis in (1, 0))
     top, left = max(rows[0] - 20 - step, 0), max(columns[0] - 20 - step, 0)
     part = grey[top : rows[-1] + 20 + step, left : columns[-1] + 20 + step]
-    part = ndimage.gaussian_filter(part, 1.0)
+    v, u = (
+        2 * (np.arange(n) + start) / size - 1
+        for n, start, size in zip(part.shape, (top, left), grey.shape, strict=True)
+    )
+    # A blurred contour at one level for all would move where the light is weaker
+    lit = np.clip(_plane(light, v, u), 0.5 * high, 2 * high)
+    part = (ndimage.gaussian_filter(part, 1.0) - low) / (lit - low)
+    contrast, level = 1.0, 0.5
     down, right = np.gradient(part)
     drops = []
     for contour in find_contours(part, level):
@@ -78,6 +85,24 @@ def find_drop(grey: np.ndarray, baseline: np.ndarray | None) -> DropContour | No
         if drop is not None:
             drops.append(drop)
     return max(drops, key=lambda drop: np.ptp(drop.points[:, 0]), default=None)
+
+
+def _light(grey: np.ndarray, bright: np.ndarray, high: float) -> np.ndarray:
+    """Fit a plane to the bright ground, away from its borders; its level, if that fails."""
+    ground = ndimage.binary_erosion(bright, iterations=6)
+    v, u = np.nonzero(ground)
+    if v.size < 100:
+        return np.array([high, 0.0, 0.0])
+    rows, columns = grey.shape
+    terms = np.stack(
+        [np.ones(v.size), 2 * (u + 0.5) / columns - 1, 2 * (v + 0.5) / rows - 1], axis=1
+    )
+    return np.linalg.lstsq(terms, grey[v, u], rcond=None)[0]
+
+
+def _plane(light: np.ndarray, v: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Evaluate the plane at rows v and columns u, from -1 to 1 in the picture."""
+    return light[0] + light[1] * u[None, :] + light[2] * v[:, None]
 
 
 def _drop_on_line(
@@ -186,7 +211,12 @@ def _measure(
     blur = contrast / np.sqrt(2 * np.pi) / np.median(steepness[run])
     # Next to the contact the drop's blur lifts the substrate's contour
     gap = min(6 * blur, 0.2 * width)
-    sides = [near & (xy[:, 0] < first[0] - gap), near & (xy[:, 0] > last[0] + gap)]
+    # ... and so does a belly that hangs over it
+    belly = (min(first[0], xy[run, 0].min()), max(last[0], xy[run, 0].max()))
+    for left, right in (belly, (first[0], last[0])):
+        sides = [near & (xy[:, 0] < left - gap), near & (xy[:, 0] > right + gap)]
+        if min(np.count_nonzero(side) for side in sides) >= 20:
+            break
     middle = (first[0] + last[0]) / 2
     if given is None:
         if min(np.count_nonzero(side) for side in sides) < 8:

@@ -107,19 +107,17 @@ def fit_laplace(points: np.ndarray, start: np.ndarray | None = None) -> ShapeFit
     """
 
     def curve(p: np.ndarray) -> np.ndarray:
-        x, z, _ = laplace_profile(_rounded(p[3])).T
+        x, z, _ = laplace_profile(p[3]).T
         half = np.stack([x, -z], axis=1)
         whole = np.concatenate([(half * [-1, 1])[:0:-1], half])
         return np.array([p[0], p[1]]) + p[2] * whole
 
     def residual(p: np.ndarray) -> np.ndarray:
         # Between tabulated Bond numbers the distance is interpolated, so it stays smooth
-        low = np.floor(p[3] / GRID) * GRID
-        share = (p[3] - low) / GRID
+        low, share = _grid_place(p[3])
+        above = round(low + GRID, 9)
         below = _distance(points, curve(np.array([*p[:3], low])))
-        return below + share * (
-            _distance(points, curve(np.array([*p[:3], low + GRID]))) - below
-        )
+        return below + share * (_distance(points, curve(np.array([*p[:3], above]))) - below)
 
     if start is None:
         centre, radius = _circle(points)
@@ -140,38 +138,52 @@ def fit_laplace(points: np.ndarray, start: np.ndarray | None = None) -> ShapeFit
         diff_step=1e-4,
     )
     p = found.x - shift
-    x, z, _ = laplace_profile(_rounded(p[3])).T
 
-    def at(parameters: np.ndarray, height: float = 0.0) -> float:
-        _, z, angle = laplace_profile(_rounded(parameters[3])).T
-        return float(np.interp((parameters[1] - height) / parameters[2], z, angle))
+    def at(parameters: np.ndarray, height: float = 0.0) -> tuple[float, float]:
+        depth = (parameters[1] - height) / parameters[2]
+        low, share = _grid_place(parameters[3])
+        ends = [
+            [np.interp(depth, z, column) for column in (angle, x)]
+            for x, z, angle in (laplace_profile(b).T for b in (low, round(low + GRID, 9)))
+        ]
+        angle, x = (1 - share) * np.array(ends[0]) + share * np.array(ends[1])
+        return float(angle), float(parameters[0] + parameters[2] * x)
 
     rest = residual(p)
     # A flat drop hardly shows its Bond number, which still is one of those tried
     known = np.array([0.0, 0.0, 0.0, 12 / MAX_BOND**2])
-    covariance = _covariance(found.jac, rest, known)
-    steps = np.array([1e-3, 0.02, 1e-3 * p[2], 2 * GRID])
+    covariance, variance = _covariance(found.jac, rest, known)
+    # Where the contour says nothing the middle of them is the least wrong, not an end
+    pull = known * (MAX_BOND / 2 - p) - found.grad / variance
+    middle = p + covariance @ pull
+    if 0 < middle[3] < MAX_BOND:
+        p = middle
+    # Near 180 degrees a hundredth of a Bond number is degrees
+    steps = np.array([1e-3, 0.02, 1e-4 * p[2], GRID / 4])
     gradient = np.array(
         [
-            (at(p + d * np.eye(4)[i]) - at(p - d * np.eye(4)[i] * (i != 3)))
+            (at(p + d * np.eye(4)[i])[0] - at(p - d * np.eye(4)[i] * (i != 3))[0])
             / (d * (1 + (i != 3)))
             for i, d in enumerate(steps)
         ]
     )
+    angle, contact = at(p)
     return ShapeFit(
-        angle=at(p),
+        angle=angle,
         stderr=float(np.sqrt(max(gradient @ covariance @ gradient, 0))),
         rms=float(np.sqrt(np.mean(rest**2))),
-        contact=float(p[0] + p[2] * np.interp(p[1] / p[2], z, x)),
-        slope_by_height=at(p, 0.5) - at(p, -0.5),
+        contact=contact,
+        slope_by_height=at(p, 0.5)[0] - at(p, -0.5)[0],
         bond_number=float(p[3]),
         parameters=p,
     )
 
 
-def _rounded(bond_number: float) -> float:
-    """Return the nearest tabulated Bond number, so that profiles are computed once."""
-    return round(max(bond_number, 0.0) / GRID) * GRID
+def _grid_place(bond_number: float) -> tuple[float, float]:
+    """Return the tabulated Bond number below one, and the share of the way to the next."""
+    cell = np.floor(max(bond_number, 0.0) / GRID + 1e-9)
+    # Rounded, so that each is computed once
+    return round(float(cell * GRID), 9), float(max(bond_number, 0.0) / GRID - cell)
 
 
 def fit_arc(points: np.ndarray) -> ShapeFit:
@@ -219,7 +231,7 @@ def fit_arc(points: np.ndarray) -> ShapeFit:
         return float(angle[i] + share * (angle[i + 1] - angle[i])), float(x)
 
     rest = residual(found.x)
-    covariance = _covariance(found.jac, rest)
+    covariance, _ = _covariance(found.jac, rest)
     gradient = np.array(
         [(at(found.x + d)[0] - at(found.x - d)[0]) / 0.02 for d in 0.01 * np.eye(5)]
     )
@@ -237,8 +249,10 @@ def fit_arc(points: np.ndarray) -> ShapeFit:
 
 def _covariance(
     jacobian: np.ndarray, residual: np.ndarray, known: np.ndarray | float = 0.0
-) -> np.ndarray:
+) -> tuple[np.ndarray, float]:
     """Covariance of the parameters, for residuals that are correlated along the contour.
+
+    With it comes the variance of one point that is worth what all are worth together.
 
     `known` holds what is known of each parameter beforehand, one over its variance.
     """
@@ -258,7 +272,8 @@ def _covariance(
     )
     # Lengths in pixels and plain numbers: to one scale before the inversion
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    return np.linalg.pinv(information * np.outer(scale, scale)) * np.outer(scale, scale)
+    scales = np.outer(scale, scale)
+    return np.linalg.pinv(information * scales) * scales, variance
 
 
 def _circle(points: np.ndarray) -> tuple[np.ndarray, float]:

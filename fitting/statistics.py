@@ -1,6 +1,7 @@
 """Surface statistics that can be trusted: noise, rounding and finite length corrected."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol, TypeGuard
 
 import numpy as np
@@ -86,9 +87,10 @@ def surface_statistics(
     lengths, gives the intervals. A Gaussian autocorrelation is kept unless the data reject
     it for a Matérn form or two scales.
 
-    A profile with an attribute `cutoff` [um], such as `data_io.EdgeProfile`, has lost what
-    is shorter; the model is filtered likewise before it is compared, and a smooth form's
-    slope is that of all wavelengths. The intervals allow for it.
+    Of a profile with an attribute `located`, such as `data_io.EdgeProfile`, that is taken,
+    with its blur and its noise: the model is blurred likewise before it is compared, and the
+    noise, of known autocorrelation, is found with it. A restored edge would not do: what is
+    left of its noise is amplified, band-limited and decided by the noise itself.
 
     Examples
     --------
@@ -117,6 +119,9 @@ def surface_statistics(
 def _profile_statistics(
     profile: ProfileLike, degree: int, form: str, quantisation: float | None
 ) -> SurfaceStatistics:
+    located = getattr(profile, "located", None)
+    if located is not None:
+        profile = located
     x, z = np.asarray(profile.x, dtype=float), np.asarray(profile.z, dtype=float)
     known = ~np.isnan(z)
     x, z = x[known], z[known]
@@ -130,10 +135,9 @@ def _profile_statistics(
         begin = np.minimum(starts, x[-1] - lags)
         return removed.along(0, begin + lags) - removed.along(0, begin)
 
-    # A restored edge ends where its noise begins, often well above the spacing
-    cutoff = float(getattr(profile, "cutoff", 0.0))
-    shortest = cutoff if cutoff > 2.1 * sampling.spacing else 0.0
-    data = AxisData(sampling, step, form_increments, degree, removed.n_terms, shortest)
+    data = AxisData(sampling, step, form_increments, degree, removed.n_terms)
+    if located is not None:
+        data = replace(data, blur=located.blur, grain=located.grain)
     along = axis_statistics("x", data, 1.0, None)
     return assemble(
         "profile", (along,), residual, (sampling.spacing,), form=form, step=step

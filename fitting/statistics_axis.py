@@ -6,7 +6,8 @@ import numpy as np
 from scipy import special
 
 from fitting.estimate import Estimate
-from fitting.statistics_fit import AxisData, AxisFit
+from fitting.statistics_fit import AxisData, AxisFit, jacobian
+from fitting.statistics_lags import Increments
 from fitting.statistics_parts import Autocorrelation, AxisStatistics
 from fitting.statistics_solver import fit_axis
 from fitting.statistics_spectrum import measured_cutoff
@@ -48,13 +49,13 @@ def axis_statistics(
     student = (special.stdtrit(freedom, 0.975) / special.ndtri(0.975)) ** 2
     sampling = data.sampling
     disturbance = fit.noise + data.step**2 / 12
+    kept, seen = fit.correlation.blurred(fit.blur)
     cutoff = measured_cutoff(
-        lambda f: fit.variance * fit.correlation.spectrum(f),
+        lambda f: kept * fit.variance * seen.spectrum(f),
         disturbance,
         sampling.spacing,
         fit.correlation.corr_length,
     )
-    cutoff = max(cutoff, data.shortest)
     # A smooth form has a slope of its own; a jagged one only down to a wavelength
     band = cutoff if fit.correlation.form in JAGGED else 0.0
     if fit.correlation.form == "gaussian":
@@ -88,7 +89,7 @@ def _measured_fall(fit: AxisFit, data: AxisData) -> tuple[float, float]:
     square = max(fit.mean_square - white, 1e-3 * fit.mean_square) / (1 - fit.loss)
     fitted = fit.correlation.corr_length
     found = data.sampling.increments(3 * fitted, 60)
-    rho = 1 - (found.mean_square / 2 - white) / square
+    rho = 1 - _drops(fit, data, found) / square
     below = np.flatnonzero(rho < np.exp(-1))
     if below.size == 0 or below[0] == 0:
         return fitted, fit.log_variance(lambda t: fit.correlation_at(t).corr_length)
@@ -103,6 +104,17 @@ def _measured_fall(fit: AxisFit, data: AxisData) -> tuple[float, float]:
     near = np.array([0.9, 1.1]) * fitted
     fall = np.diff(fit.correlation.rho(near))[0] / np.log(1.1 / 0.9)
     return float(length), float(toward @ covariance @ toward) / fall**2
+
+
+def _drops(fit: AxisFit, data: AxisData, found: Increments) -> Array:
+    """Half the mean square increments without noise and rounding, blur undone. [um²]
+
+    Blur has no inverse at single lags; what the fitted form loses there is made good.
+    """
+    noise = fit.noise * data.noise_increments(found.lags) / 2
+    kept, seen = fit.correlation.blurred(fit.blur)
+    gain = (1 - fit.correlation.rho(found.lags)) / (kept * (1 - seen.rho(found.lags)))
+    return gain * (found.mean_square / 2 - noise - data.step**2 / 12)
 
 
 def _unbiased(length: float, log_variance: float) -> Estimate:
@@ -127,7 +139,7 @@ def _derivative_rms(
 def _describe(fit: AxisFit, data: AxisData) -> Autocorrelation:
     correlation = fit.correlation
     found = data.sampling.increments(3 * correlation.corr_length, 40)
-    measured = 1 - (found.mean_square / 2 - fit.noise - data.step**2 / 12) / fit.variance
+    measured = 1 - _drops(fit, data, found) / fit.variance
     texts = {
         "gaussian": "Gaussian, exp(-r²/l²)",
         "periodic": "periodic over {period:.3g} um, in step for {coherence_length:.3g} um",
@@ -165,17 +177,14 @@ def _height_log_variance(fit: AxisFit, square: float, loss: float) -> float:
     """Variance of ln height² through the mean square, the noise and the loss."""
     gradient = -fit.response[-1] * fit.mean_square / (square * (1 - loss))
     gradient[0] += 1 / (square * (1 - loss))
-    # The loss grows in proportion to the correlation length
-    by_length = np.zeros(fit.parameters.size)
-    for i in range(fit.parameters.size):
-        shift = np.zeros(fit.parameters.size)
-        shift[i] = 1e-4
-        by_length[i] = (
-            np.log(
-                fit.correlation_at(fit.parameters + shift).corr_length
-                / fit.correlation_at(fit.parameters - shift).corr_length
-            )
-            / 2e-4
-        )
-    gradient = gradient + loss / (1 - loss) * by_length @ fit.response
+    # The form's part of the loss grows in proportion to the correlation length
+    form = loss - (1 - fit.correlation.blurred(fit.blur)[0])
+
+    def left(parameters: Array) -> Array:
+        correlation = fit.correlation_at(parameters)
+        kept = correlation.blurred(fit.blur)[0]
+        return np.array([kept - form * np.log(correlation.corr_length)])
+
+    by_parameter = jacobian(left, fit.parameters)[0]
+    gradient = gradient - by_parameter / (1 - loss) @ fit.response
     return max(float(gradient @ fit.covariance @ gradient), 1e-12)

@@ -1,7 +1,7 @@
 """What goes into the fit of one axis and what comes out, with its errors."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -28,8 +28,10 @@ class AxisData:
         Of the removed form.
     n_terms : int
         Its number of coefficients.
-    shortest : float
-        Wavelength below which a filter took everything, 0 for none. [um]
+    blur : float
+        Standard deviation of the blur along the heights, 0 for none. [um]
+    grain : ndarray, shape (m,)
+        Autocorrelation of the noise at 0, 1, 2 ... steps; 1 alone for white noise.
     """
 
     sampling: Sampling
@@ -37,7 +39,13 @@ class AxisData:
     form_increments: Callable[[Array], Array]
     degree: int
     n_terms: int
-    shortest: float = 0.0
+    blur: float = 0.0
+    grain: Array = field(default_factory=lambda: np.ones(1))
+
+    def noise_increments(self, lags: Array) -> Array:
+        """Mean square increments of noise of unit variance."""
+        steps = np.arange(self.grain.size + 1) * self.sampling.spacing
+        return 2 * (1 - np.interp(lags, steps, np.append(self.grain, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -67,7 +75,9 @@ class AxisFit:
     mean_square : float
         Of the residual heights. [um²]
     loss : float
-        Share of the height variance that form removal and a filter take. [1]
+        Share of the height variance that form removal and blur take. [1]
+    blur : float
+        Of the heights that were fitted. [um]
     """
 
     family: Family
@@ -83,6 +93,7 @@ class AxisFit:
     extent: Extent
     mean_square: float
     loss: float
+    blur: float
 
     def log_variance(
         self, quantity: Callable[[Array], float], direct: float = 0.0

@@ -7,7 +7,7 @@ many describe what has no simple form. The periodic form is that of machined gro
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import integrate, optimize, special
@@ -16,7 +16,8 @@ Array = np.ndarray
 
 SMOOTHNESS_RANGE = (0.15, 8.0)
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(96)
+_HERMITE_NODES, _HERMITE_WEIGHTS = np.polynomial.hermite.hermgauss(24)
+_HERMITE_WEIGHTS /= np.sqrt(np.pi)
 
 
 @dataclass(frozen=True)
@@ -71,34 +72,40 @@ class Correlation:
         integrand = 2 * (2 * np.pi * f) ** (2 * derivative) * self.spectrum(f) * f
         return float(integrate.simpson(integrand, x=t))
 
-    def beyond(self, wavelength: float, lags: Array) -> tuple[float, Array]:
-        r"""Shares of height variance and increments that a low-pass filter takes.
+    def blurred(self, blur: float) -> tuple[float, "Correlation"]:
+        r"""Share of the height variance that a Gaussian blur leaves, and what is left.
 
-        .. math:: 2 \int_{1/\lambda}^\infty S(f)\,df, \quad
-                  2 \int_{1/\lambda}^\infty S(f) (1 - \cos 2 \pi f r)\,df
+        .. math:: B(r) = \int ρ(r - u) \exp(-u^2 / 4 σ^2) / \sqrt{4 π σ^2} \, du
+
+        A blur of standard deviation σ along the surface acts twice on products of heights.
+        B(0) is the share; B(r) / B(0) is the autocorrelation of the blurred heights.
 
         Parameters
         ----------
-        wavelength : float
-            Shortest that the filter leaves, λ. [um]
-        lags : ndarray
-            [um]
+        blur : float
+            σ. [um] Not above the shortest length, which it would hide.
 
         Examples
         --------
-        A Gaussian loses erfc(π l / λ) of its variance:
+        A Gaussian stays one, of length sqrt(l² + 4 σ²):
 
-        >>> share, _ = gaussian(2.0).beyond(5.0, np.array([1.0]))
-        >>> bool(abs(share - special.erfc(np.pi * 2.0 / 5.0)) < 1e-9)
-        True
+        >>> share, left = gaussian(2.0).blurred(0.75)
+        >>> bool(abs(share - 2.0 / 2.5) < 1e-9), bool(abs(left.rho(2.5) - np.exp(-1)) < 1e-9)
+        (True, True)
         """
-        low = -np.log(wavelength)
-        high = max(np.log(200 / self.shortest_length()), low + 1)
-        t = low + (high - low) * (_NODES + 1) / 2
-        f = np.exp(t)
-        weight = (high - low) * _WEIGHTS * self.spectrum(f) * f
-        swing = 1 - np.cos(2 * np.pi * np.multiply.outer(lags, f))
-        return float(weight.sum()), swing @ weight
+        if blur <= 0:
+            return 1.0, self
+
+        def raw(r: Array) -> Array:
+            lags = np.abs(np.add.outer(2 * blur * _HERMITE_NODES, np.asarray(r)))
+            return np.tensordot(_HERMITE_WEIGHTS, self.rho(lags), 1)
+
+        share = float(raw(np.zeros(())))
+        return share, replace(
+            self,
+            rho=lambda r: raw(r) / share,
+            spectrum=lambda f: self.spectrum(f) * np.exp(-((2 * np.pi * f * blur) ** 2)) / share,
+        )
 
     def stretched(self, factor: float) -> "Correlation":
         """Return the same form with all lengths multiplied by `factor`."""

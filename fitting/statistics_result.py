@@ -163,8 +163,10 @@ class SurfaceStatistics:
         if self.residual.ndim == 2 and axis == "x":
             lines = self.residual.T
         frequency, psd = line_spectrum(lines, chosen.spacing)
-        noise = 2 * chosen.spacing * (chosen.fit.noise + self.quantisation**2 / 12)
-        model = 2 * chosen.fit.variance * chosen.fit.correlation.spectrum(frequency)
+        fit = chosen.fit
+        noise = 2 * chosen.spacing * (fit.noise + self.quantisation**2 / 12)
+        kept, seen = fit.correlation.blurred(fit.blur)
+        model = 2 * kept * fit.variance * seen.spectrum(frequency)
         return PowerSpectrum(frequency, psd, model + noise, noise)
 
     def to_surface(

@@ -153,10 +153,14 @@ class _Problem:
         at = _Start(reference.family, stretched, at.variance, at.noise)
         self._set_weights(at)
         lags = self.found.lags
-        lengths = np.geomspace(2 * self.data.sampling.spacing, 4 * length, 24)
-        curves = 2 * (1 - np.exp(-((lags[:, None] / lengths) ** 2)))
-        columns = np.vstack([np.ones(lengths.size), curves])
-        noise = np.concatenate([[1.0], np.full(lags.size, 2.0)])
+        blur = self.data.blur
+        least = max(2 * self.data.sampling.spacing, blur)
+        lengths = np.geomspace(least, 4 * length, 24)
+        # A Gaussian scale of length l, blurred, is one of sqrt(l² + 4 blur²)
+        wide = np.hypot(lengths, 2 * blur)
+        curves = 2 * (1 - np.exp(-((lags[:, None] / wide) ** 2)))
+        columns = np.vstack([np.ones(lengths.size), curves]) * (lengths / wide)
+        noise = np.concatenate([[1.0], self.data.noise_increments(lags)])
         observed = np.concatenate([[self.mean_square], self.found.mean_square])
         # Rounding is small beside such data; Sheppard's correction makes the problem linear
         observed = observed - self.rounding.variance * noise
@@ -177,14 +181,16 @@ class _Problem:
         length = float(np.clip(correlation.corr_length, 0, self.extent.length / 3))
         self.found = data.sampling.increments(self.reach * length, self.n_lags)
         lags = self.found.lags
-        true = 2 * at.variance * (1 - correlation.rho(lags)) + 2 * at.noise
+        kept, seen = correlation.blurred(data.blur)
+        variance = kept * at.variance
+        true = 2 * variance * (1 - seen.rho(lags)) + at.noise * data.noise_increments(lags)
         form_increments = data.form_increments(lags) if data.step > 0 else np.zeros((1, 0))
         # A quarter leaves room for what the fit may still find
         self.rounding = Rounding.of_form(data.step, form_increments, true.min() / 4)
         covariance = increment_covariance(
             lags,
-            correlation,
-            (at.variance, at.noise + self.rounding.variance),
+            seen,
+            (variance, at.noise + self.rounding.variance),
             self.extent,
         )
         gain = np.concatenate([[1.0], self.rounding.gain(true)])
@@ -208,22 +214,20 @@ class _Problem:
         variance = np.exp(parameters[0])
         noise = parameters[-1] * self.mean_square
         correlation = family.build(parameters[1:-1])
-        drop = 1 - correlation.rho(self.found.lags)
-        if self.data.shortest:
-            drop = drop - correlation.beyond(self.data.shortest, self.found.lags)[1]
-        true = 2 * variance * drop + 2 * noise
+        kept, seen = correlation.blurred(self.data.blur)
+        drop = kept * (1 - seen.rho(self.found.lags))
+        true = 2 * variance * drop + noise * self.data.noise_increments(self.found.lags)
         share = 1 - self.loss(correlation)
         left = 1 - self.data.n_terms / self.extent.n_points
         mean_square = variance * share + noise * left + self.rounding.variance
         return np.concatenate([[mean_square], self.rounding.increments(true)])
 
     def loss(self, correlation: Correlation) -> float:
-        """Share of the height variance that form and filter take, in expectation."""
+        """Share of the height variance that form and blur take, in expectation."""
         along = form_losses(correlation, self.extent.length, self.data.degree)
         if self.losses_across is None:
-            short = self.data.shortest
-            filtered = correlation.beyond(short, np.zeros(1))[0] if short else 0.0
-            return float(min(along.sum() + filtered, 0.9))
+            blurred = 1 - correlation.blurred(self.data.blur)[0]
+            return float(min(along.sum() + blurred, 0.9))
         across = self.losses_across
         total = sum(along[i] * across[: along.size - i].sum() for i in range(along.size))
         return float(min(total, 0.9))
@@ -232,8 +236,8 @@ class _Problem:
         self, family: Family, start: "_Start | AxisFit", starts: list[list[float]] | None
     ) -> AxisFit:
         length = start.correlation.corr_length
-        # Shorter than the spacing, roughness is noise
-        shortest = _SHORTEST * self.data.sampling.spacing
+        # Shorter than the spacing, roughness is noise; shorter than the blur, it is gone
+        shortest = max(_SHORTEST * self.data.sampling.spacing, self.data.blur)
         length = max(length, shortest)
         low, high = family.limits(length, shortest)
         observed = np.concatenate([[self.mean_square], self.found.mean_square])
@@ -270,6 +274,7 @@ class _Problem:
             extent=self.extent,
             mean_square=self.mean_square,
             loss=self.loss(family.build(found[1:-1])),
+            blur=self.data.blur,
         )
 
     def _with_errors(self, fit: AxisFit) -> AxisFit:

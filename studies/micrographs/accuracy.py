@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from skimage.io import imsave
 
+from data_io import Profile
 from data_io.micrograph import read_profile_image
 from examples.micrograph import Camera, Edge, gaussian_edge, photograph
 from fitting import surface_statistics
@@ -42,11 +43,16 @@ def one_picture(
     read = read_profile_image(path, camera.um_per_pixel)
     error = read.z - aligned(truth, read.x)
     statistics = surface_statistics(read)
+    exact = surface_statistics(Profile(truth.x[::8], truth.z[::8]))
     return {
         "raw slope": slope_rms(raw.x, raw.z) / slope_rms(truth.x, truth.z),
         "slope": slope_rms(read.x, read.z) / slope_rms(truth.x, truth.z),
         "height": read.z.std() / truth.z.std(),
         "fitted slope": statistics.slope_rms.value / slope_rms(truth.x, truth.z),
+        "ensemble slope": statistics.slope_rms.value / edge.slope_rms,
+        "ensemble height": statistics.height_rms.value / edge.height_rms,
+        "exact slope": exact.slope_rms.value / edge.slope_rms,
+        "exact height": exact.height_rms.value / edge.height_rms,
         "error": float(error.std()) / camera.um_per_pixel,
         "blur": read.blur / camera.um_per_pixel / np.hypot(camera.blur, np.sqrt(1 / 12)),
         "tilt": float(np.rad2deg(read.tilt - camera.tilt)),
@@ -70,9 +76,12 @@ def aligned(truth: Edge, x: np.ndarray) -> np.ndarray:
     return np.interp(x + truth.x[-1] / 2 - x[-1] / 2, truth.x, truth.z)
 
 
+# Of the ensemble: root mean square over the pictures, and of fits to the exact edges
 HEAD = """
-corr blur grain light tilt |  raw   | read slope  | fitted slope | read height | edge | blur
- px   px    %     %   deg  | slope  | ratio  sd % | ratio  sd %  | ratio  sd % |  px  |"""
+corr blur grain light tilt |  raw   | read slope  | fitted slope | read height | edge | blur  \
+|  ensemble slope, height (exact edges)
+ px   px    %     %   deg  | slope  | ratio  sd % | ratio  sd %  | ratio  sd % |  px  | ratio \
+|"""
 
 
 def main() -> None:
@@ -108,13 +117,19 @@ def main() -> None:
             ]
             mean = {key: np.mean([row[key] for row in rows]) for key in rows[0]}
             sd = {key: 100 * np.std([row[key] for row in rows]) for key in rows[0]}
+            rms = {
+                key: np.sqrt(np.mean(np.square([row[key] for row in rows])))
+                for key in rows[0]
+            }
             print(
                 f"{corr:4.0f} {blur:4.1f} {100 * grain:5.0f} {100 * light:5.0f} "
                 f"{tilt:5.1f}  | {mean['raw slope']:6.3f} | "
                 f"{mean['slope']:.3f} {sd['slope']:5.1f} | "
                 f"{mean['fitted slope']:.3f} {sd['fitted slope']:5.1f}  | "
                 f"{mean['height']:.3f} {sd['height']:5.1f} | {mean['error']:.2f} | "
-                f"{mean['blur']:.3f}",
+                f"{mean['blur']:.3f} | "
+                f"{rms['ensemble slope']:.3f}, {rms['ensemble height']:.3f} "
+                f"({rms['exact slope']:.3f}, {rms['exact height']:.3f})",
                 flush=True,
             )
 

@@ -11,8 +11,9 @@ from accuracy import in_view, slope_rms
 from scipy import ndimage
 from skimage.io import imsave
 
-from data_io import read_profile_image
+from data_io import Profile, read_profile_image
 from examples.micrograph import Camera, gaussian_edge, photograph
+from fitting import surface_statistics
 
 CAMERA = Camera(blur=1.5, grain=0.05, uneven_light=0.3, tilt=np.deg2rad(2))
 
@@ -54,28 +55,33 @@ def pictures(rng: np.random.Generator) -> tuple[object, dict[str, np.ndarray]]:
 
 
 def main() -> None:
-    """Print slope and height, read over true, mean and standard deviation."""
+    """Print slope and height, read over true; slope fitted over that of the exact edge."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--edges", type=int, default=4)
     parser.add_argument("--first-seed", type=int, default=0)
     arguments = parser.parse_args()
-    ratios: dict[str, list[tuple[float, float]]] = {}
+    ratios: dict[str, list[tuple[float, float, float]]] = {}
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         path = Path(folder) / "edge.png"
         for seed in range(arguments.first_seed, arguments.first_seed + arguments.edges):
             truth, kinds = pictures(np.random.default_rng(seed))
+            exact = surface_statistics(Profile(truth.x[::8], truth.z[::8])).slope_rms.value
             for name, image in kinds.items():
                 imsave(path, image, check_contrast=False)
                 read = read_profile_image(path, 0.5)
                 slope = slope_rms(read.x, read.z) / slope_rms(truth.x, truth.z)
-                ratios.setdefault(name, []).append((slope, read.z.std() / truth.z.std()))
+                fitted = surface_statistics(read).slope_rms.value / exact
+                height = read.z.std() / truth.z.std()
+                ratios.setdefault(name, []).append((slope, height, fitted))
     for name, values in ratios.items():
-        (slope, height), (slope_sd, height_sd) = np.mean(values, 0), np.std(values, 0)
-        print(
-            f"{name:20s} slope {slope:.3f} ± {slope_sd:.3f}  "
-            f"height {height:.3f} ± {height_sd:.3f}"
+        parts = zip(
+            ("read slope", "height", "fitted slope"),
+            np.mean(values, 0),
+            np.std(values, 0),
+            strict=True,
         )
+        print(f"{name:20s}", "  ".join(f"{n} {v:.3f} ± {sd:.3f}" for n, v, sd in parts))
 
 
 if __name__ == "__main__":

@@ -40,21 +40,19 @@ def test_spectrum_and_autocorrelation_are_a_fourier_pair(form):
 
 
 @pytest.mark.parametrize("form", FORMS, ids=lambda f: f.form)
-def test_what_a_filter_takes_and_leaves_adds_up(form):
-    """Against the adaptive integral below the cut-off and rho itself."""
-    wavelength, lags = 1.7 * form.corr_length, np.array([0.2, 0.9]) * form.corr_length
-    share, increments = form.beyond(wavelength, lags)
-
-    def below(lag, part):
-        return 2 * integrate.quad(
-            lambda f: float(form.spectrum(np.array(f))) * part(2 * np.pi * f * lag),
-            0, 1 / wavelength, limit=500,
-        )[0]  # fmt: skip
-
-    assert share == pytest.approx(1 - below(0.0, np.cos), abs=3e-3)
-    for lag, taken in zip(lags, increments, strict=True):
-        left = below(lag, lambda phase: 1 - np.cos(phase))
-        assert taken == pytest.approx(1 - float(form.rho(lag)) - left, abs=3e-3)
+def test_blur_acts_on_the_spectrum(form):
+    """exp(-(2 pi f blur)²) on the power: the blurred autocorrelation is its transform."""
+    blur = 0.6 * form.shortest_length()
+    share, left = form.blurred(blur)
+    f = np.linspace(-3 / blur, 3 / blur, 100_001)
+    power = form.spectrum(f) * np.exp(-((2 * np.pi * f * blur) ** 2))
+    assert_allclose(share, integrate.simpson(power, x=f), atol=2e-3)
+    for lag in (0.3 * form.corr_length, 1.2 * form.corr_length):
+        blurred = integrate.simpson(power * np.cos(2 * np.pi * f * lag), x=f)
+        assert_allclose(share * left.rho(np.array(lag)), blurred, atol=2e-3)
+    assert_allclose(share * left.spectrum(f), power, rtol=1e-9)
+    # Without blur nothing is lost
+    assert form.blurred(0.0) == (1.0, form)
 
 
 def test_matern_of_one_half_is_exponential_and_of_large_smoothness_gaussian():
