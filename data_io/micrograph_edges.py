@@ -142,6 +142,9 @@ def _step(
     count = np.histogram(d, bins)[0]
     total = np.histogram(d, bins, weights=s)[0]
     filled = count > 0.02 * count.max()
+    if np.count_nonzero(filled) < 8:
+        # The border is nowhere near the amount of material: no step at all
+        return 1.0, np.zeros(slope.size)
     centre, mean = (bins[:-1] + 0.125)[filled], total[filled] / count[filled]
     (_, width, _, _), _ = optimize.curve_fit(
         lambda d, shift, w, low, high: low + (high - low) * special.ndtr((d - shift) / w),

@@ -256,8 +256,8 @@ def _fit_levels(
 def _classes(mask: np.ndarray, smooth: np.ndarray, step: int) -> list[np.ndarray]:
     """Return the dark and the bright pixels that the blurred border does not reach.
 
-    What it leaves in them, 2 % at two blurs, bends a level and with it the scale of heights.
-    Where phases are too thin to keep so far away, six pixels must do.
+    What it leaves in them, 2 % at two blurs, bends a level and with it the scale of
+    heights. Where phases are too thin to keep so far away, six pixels must do.
     """
     rims = [max(RIM_BLURS * _border_width(mask, smooth), 6.0 / step), 6.0 / step]
     for rim in rims:
@@ -272,7 +272,7 @@ def _classes(mask: np.ndarray, smooth: np.ndarray, step: int) -> list[np.ndarray
 
 
 def _border_width(mask: np.ndarray, smooth: np.ndarray) -> float:
-    """Standard deviation of the blur across the border, smoothing included. [samples]"""
+    """Return the width of the step across the border, smoothing included. [samples]"""
     border = mask ^ ndimage.binary_erosion(mask, border_value=1)
     if not border.any():
         return 0.0

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy import optimize
+from scipy import optimize, stats
 from scipy.spatial import cKDTree
 
 # Bond numbers at which profiles are computed; between them distances are interpolated
@@ -23,6 +23,8 @@ class ShapeFit:
         Contact angle at the baseline. [rad]
     stderr : float
         Standard error from the scatter of the contour alone. [rad]
+    centre : float
+        Middle of the interval, where a limit of the Bond number makes it one-sided. [rad]
     rms : float
         Root mean square distance of the contour from the curve. [pixels]
     contact : float
@@ -38,6 +40,7 @@ class ShapeFit:
 
     angle: float
     stderr: float
+    centre: float
     rms: float
     contact: float
     slope_by_height: float
@@ -150,14 +153,9 @@ def fit_laplace(points: np.ndarray, start: np.ndarray | None = None) -> ShapeFit
         return float(angle), float(parameters[0] + parameters[2] * x)
 
     rest = residual(p)
-    # A flat drop hardly shows its Bond number, which still is one of those tried
-    known = np.array([0.0, 0.0, 0.0, 12 / MAX_BOND**2])
-    covariance, variance = _covariance(found.jac, rest, known)
-    # Where the contour says nothing the middle of them is the least wrong, not an end
-    pull = known * (MAX_BOND / 2 - p) - found.grad / variance
-    middle = p + covariance @ pull
-    if 0 < middle[3] < MAX_BOND:
-        p = middle
+    covariance, variance = _covariance(found.jac, rest)
+    free = p - covariance @ found.grad / variance
+    middle, covariance = _within_bond_numbers(free, covariance)
     # Near 180 degrees a hundredth of a Bond number is degrees
     steps = np.array([1e-3, 0.02, 1e-4 * p[2], GRID / 4])
     gradient = np.array(
@@ -171,12 +169,29 @@ def fit_laplace(points: np.ndarray, start: np.ndarray | None = None) -> ShapeFit
     return ShapeFit(
         angle=angle,
         stderr=float(np.sqrt(max(gradient @ covariance @ gradient, 0))),
+        centre=at(middle)[0],
         rms=float(np.sqrt(np.mean(rest**2))),
         contact=contact,
         slope_by_height=at(p, 0.5)[0] - at(p, -0.5)[0],
         bond_number=float(p[3]),
         parameters=p,
     )
+
+
+def _within_bond_numbers(
+    free: np.ndarray, covariance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and covariance of the parameters if all Bond numbers tried are equally likely.
+
+    `free` is the best fit without limits, to first order. A sphere has a Bond number at a
+    limit, and a flat drop hardly shows its own: the errors of the fit at an end of the
+    range lead out of it, and say nothing of the way in.
+    """
+    spread = float(np.sqrt(covariance[3, 3]))
+    limits = (np.array([0.0, MAX_BOND]) - free[3]) / spread
+    mean, variance = stats.truncnorm.stats(*limits, moments="mv")
+    along = covariance[3] / spread
+    return free + along * mean, covariance + (variance - 1) * np.outer(along, along)
 
 
 def _grid_place(bond_number: float) -> tuple[float, float]:
@@ -239,6 +254,7 @@ def fit_arc(points: np.ndarray) -> ShapeFit:
     return ShapeFit(
         angle=angle,
         stderr=float(np.sqrt(max(gradient @ covariance @ gradient, 0))),
+        centre=angle,
         rms=float(np.sqrt(np.mean(rest**2))),
         contact=contact,
         slope_by_height=at(found.x, 0.5)[0] - at(found.x, -0.5)[0],
@@ -247,14 +263,10 @@ def fit_arc(points: np.ndarray) -> ShapeFit:
     )
 
 
-def _covariance(
-    jacobian: np.ndarray, residual: np.ndarray, known: np.ndarray | float = 0.0
-) -> tuple[np.ndarray, float]:
+def _covariance(jacobian: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, float]:
     """Covariance of the parameters, for residuals that are correlated along the contour.
 
-    With it comes the variance of one point that is worth what all are worth together.
-
-    `known` holds what is known of each parameter beforehand, one over its variance.
+    With it comes the variance that each point would have if all were independent.
     """
     centred = residual - residual.mean()
     spectrum = np.abs(np.fft.rfft(centred, 2 * centred.size)) ** 2
@@ -267,9 +279,7 @@ def _covariance(
     # Each parameter takes the scatter of one independent residual, not of one point
     dof = max(residual.size - jacobian.shape[1] * inflation, residual.size / 10)
     variance = float(np.sum(residual**2)) / dof * inflation
-    information = jacobian.T @ jacobian / variance + np.diag(
-        known * np.ones(len(jacobian.T))
-    )
+    information = jacobian.T @ jacobian / variance
     # Lengths in pixels and plain numbers: to one scale before the inversion
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     scales = np.outer(scale, scale)

@@ -170,8 +170,10 @@ def _fit_sides(drop: DropContour, origin: np.ndarray) -> ContactAngle:
             + (fit.slope_by_height * drop.offset_stderr) ** 2
             + drop.lean_stderr**2
         )
-        degrees, stderr = float(np.rad2deg(fit.angle)), float(np.rad2deg(error))
-        low, high = (np.clip(degrees + d * stderr, 0, 180) for d in (-1.96, 1.96))
+        degrees = float(np.rad2deg(fit.angle))
+        ends = [np.rad2deg(fit.centre + d * error) for d in (-1.96, 1.96)]
+        low, high = np.clip([min(ends[0], degrees), max(ends[1], degrees)], 0, 180)
+        stderr = float(np.rad2deg(np.hypot(error, fit.centre - fit.angle)))
         estimates.append(Estimate(degrees, stderr, float(low), float(high)))
         if abs(fit.angle - other.angle) > np.deg2rad(3):
             remarks.append(

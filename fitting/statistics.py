@@ -88,9 +88,9 @@ def surface_statistics(
     it for a Matérn form or two scales.
 
     Of a profile with an attribute `located`, such as `data_io.EdgeProfile`, that is taken,
-    with its blur and its noise: the model is blurred likewise before it is compared, and the
-    noise, of known autocorrelation, is found with it. A restored edge would not do: what is
-    left of its noise is amplified, band-limited and decided by the noise itself.
+    with its blur and its noise: the model is blurred likewise before it is compared, and
+    the noise, of known autocorrelation, is found with it. A restored edge would not do:
+    what is left of its noise is amplified, band-limited and decided by the noise itself.
 
     Examples
     --------

@@ -44,6 +44,8 @@ class AxisData:
 
     def noise_increments(self, lags: Array) -> Array:
         """Mean square increments of noise of unit variance."""
+        if self.grain.size == 1:
+            return np.full(lags.shape, 2.0)
         steps = np.arange(self.grain.size + 1) * self.sampling.spacing
         return 2 * (1 - np.interp(lags, steps, np.append(self.grain, 0.0)))
 

@@ -19,10 +19,11 @@ def main() -> None:
     parser.add_argument("--pictures", type=int, default=4, help="pictures a condition")
     parser.add_argument("--first-seed", type=int, default=0)
     arguments = parser.parse_args()
-    print("bond  angle | width blur grain |  bias    rms  stderr  rms(error/stderr)")
+    print("bond  angle | width blur grain |  bias    rms  stderr  rms(error/stderr) inside")
+    everywhere = []
     for bond, degrees, camera in itertools.product((0.0, 1.5), ANGLES, CAMERAS):
         width, blur, grain = camera
-        errors, stderrs = [], []
+        errors, stderrs, inside = [], [], []
         for seed in range(arguments.first_seed, arguments.first_seed + arguments.pictures):
             drop = DropPicture(
                 angle=np.deg2rad(degrees),
@@ -36,13 +37,18 @@ def main() -> None:
             for side in (result.left, result.right):
                 errors.append(side.value - degrees)
                 stderrs.append(side.stderr)
+                inside.append(side.low <= degrees <= side.high)
+        everywhere += inside
         error, stderr = np.array(errors), np.array(stderrs)
         print(
             f"{bond:4.1f} {degrees:6d} | {width:5.0f} {blur:4.1f} {100 * grain:4.0f}% | "
             f"{error.mean():+5.2f} {np.sqrt(np.mean(error**2)):6.2f} {stderr.mean():7.2f} "
-            f"{np.sqrt(np.mean((error / stderr) ** 2)):11.2f}",
+            f"{np.sqrt(np.mean((error / stderr) ** 2)):11.2f} "
+            f"{np.mean(inside):13.0%}",
             flush=True,
         )
+    held, sides = np.mean(everywhere), len(everywhere)
+    print(f"95 % intervals hold the truth in {held:.1%} of {sides} sides")
 
 
 if __name__ == "__main__":

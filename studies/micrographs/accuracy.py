@@ -78,10 +78,9 @@ def aligned(truth: Edge, x: np.ndarray) -> np.ndarray:
 
 # Of the ensemble: root mean square over the pictures, and of fits to the exact edges
 HEAD = """
-corr blur grain light tilt |  raw   | read slope  | fitted slope | read height | edge | blur  \
-|  ensemble slope, height (exact edges)
- px   px    %     %   deg  | slope  | ratio  sd % | ratio  sd %  | ratio  sd % |  px  | ratio \
-|"""
+corr blur grain light tilt |  raw   | read slope  | fitted slope | read height | edge | blur
+ px   px    %     %   deg  | slope  | ratio  sd % | ratio  sd %  | ratio  sd % |  px  |
+     | fitted slope and height over the ensemble's (of the exact edges)"""
 
 
 def main() -> None:
@@ -127,7 +126,7 @@ def main() -> None:
                 f"{mean['slope']:.3f} {sd['slope']:5.1f} | "
                 f"{mean['fitted slope']:.3f} {sd['fitted slope']:5.1f}  | "
                 f"{mean['height']:.3f} {sd['height']:5.1f} | {mean['error']:.2f} | "
-                f"{mean['blur']:.3f} | "
+                f"{mean['blur']:.3f}\n     | "
                 f"{rms['ensemble slope']:.3f}, {rms['ensemble height']:.3f} "
                 f"({rms['exact slope']:.3f}, {rms['exact height']:.3f})",
                 flush=True,

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scipy import fft, special
+from scipy import special
+from scipy.ndimage import gaussian_filter1d
 
 from fitting import surface_statistics
 
@@ -84,23 +85,27 @@ def test_known_blur_and_correlated_noise_are_made_good():
     rng = np.random.default_rng(12)
     blur, noise = 0.25 * LENGTH, 0.3
     # Neighbours share half of their noise, those beyond none of it
-    grain = np.array([1.0, 0.5])
-    plain, told, untold = [], [], []
-    for _ in range(30):
+    white, grain = np.ones(1), np.array([1.0, 0.5])
+    found = []
+    for _ in range(20):
         z = smooth_heights(1100, 1.0, rng)
-        white = noise / np.sqrt(2) * rng.normal(size=z.size + 1)
-        seen = (gaussian_filter1d(z, blur) + white[1:] + white[:-1])[50:-50]
-        located = SimpleNamespace(x=np.arange(1000.0), z=seen, blur=blur, grain=grain)
-        picture = SimpleNamespace(x=located.x, z=np.zeros(1000), located=located)
-        plain.append(surface_statistics(profile(z[50:-50])).slope_rms.value)
-        untold.append(surface_statistics(profile(seen)).slope_rms.value)
-        found = surface_statistics(picture)
-        told.append([found.slope_rms.value, found.noise_rms.value])
+        steps = noise / np.sqrt(2) * rng.normal(size=z.size + 1)
+        seen = (gaussian_filter1d(z, blur) + steps[1:] + steps[:-1])[50:-50]
+        true = surface_statistics(profile(z[50:-50])).slope_rms.value
+        row = []
+        for said in ((blur, grain), (0.0, grain), (blur, white)):
+            located = SimpleNamespace(x=np.arange(1000.0), z=seen)
+            located.blur, located.grain = said
+            picture = SimpleNamespace(x=located.x, z=np.zeros(1000), located=located)
+            result = surface_statistics(picture)
+            row.append([result.slope_rms.value / true, result.noise_rms.value / noise])
+        found.append(row)
+    told, without_blur, as_white = np.mean(found, axis=0)
+    # 200 others scattered by 0.027 and 0.029 each: three standard errors
+    assert_allclose(told, 1.0, atol=0.02)
     # A blur of l/4 leaves (1 + 1/4)^(-3/4) = 0.85 of the slope
-    assert np.mean(untold) / np.mean(plain) < 0.93
-    slope, rms = np.mean(told, axis=0)
-    assert slope / np.mean(plain) == pytest.approx(1.0, abs=SLOPE_LIMIT)
-    assert rms == pytest.approx(noise, rel=0.03)
+    assert without_blur[0] == pytest.approx(0.85, abs=0.03)
+    assert as_white[0] > 1.2
 
 
 def test_noise_is_measured():
