@@ -10,7 +10,7 @@ from skimage import io
 
 from examples.drop_picture import DropPicture, draw, meridian
 from fitting import contact_angle
-from fitting.drop_shapes import laplace_profile
+from fitting.drop_shapes import fit_laplace, laplace_profile
 from pbrdf.errors import DataFileError
 
 
@@ -101,6 +101,38 @@ def test_profile_of_bashforth_and_adams():
     assert_allclose(
         [np.interp(2.0, angle, x), np.interp(2.0, angle, z)], expected, atol=2e-4
     )
+
+
+@pytest.mark.parametrize("bond_number", [0.0, 1.504])
+def test_points_of_a_drop_give_its_angle(bond_number):
+    """Near 140 degrees five thousandths of a Bond number, half a grid cell, are 0.3."""
+    half = 200 * meridian(np.deg2rad(140), bond_number)[::-4][::-1]
+    both = np.concatenate([(half * [-1, 1])[::-1], half[1:]])
+    points = np.stack([both[:, 0], half[-1, 1] - both[:, 1]], axis=1)
+    found = fit_laplace(points[points[:, 1] > 10])
+    assert np.rad2deg(found.angle) == pytest.approx(140, abs=0.03)
+    assert found.bond_number == pytest.approx(bond_number, abs=5e-4)
+    assert found.contact == pytest.approx(half[-1, 0], abs=0.1)
+
+
+def test_uneven_light_does_not_turn_the_baseline():
+    """One level for all would move a blurred contour by 0.9 pixels from end to end."""
+    result = contact_angle(picture(75, blur=3.0, grain=0.01, uneven_light=0.4))
+    assert result.lean == pytest.approx(1.5, abs=0.02)
+    for side in (result.left, result.right):
+        assert side.value == pytest.approx(75, abs=0.15)
+
+
+def test_a_limit_of_the_bond_number_makes_the_interval_one_sided():
+    """A sphere has the least there is: its angle may be larger than found, hardly less."""
+    result = contact_angle(picture(75, base_width=160, blur=2.0, grain=0.05, seed=4))
+    for side in (result.left, result.right):
+        assert side.low <= side.value <= side.high
+        assert side.low < 75 < side.high
+    assert max(
+        (side.high - side.value) / (side.value - side.low + 1e-9)
+        for side in (result.left, result.right)
+    ) > 2  # fmt: skip
 
 
 def test_given_baseline_and_crop():
