@@ -1,4 +1,4 @@
-"""Total reflection under water with its phases: grooves from which light leaves as it came."""
+"""Total reflection under water: grooves from which all light leaves as it came."""
 
 import numpy as np
 import pytest
