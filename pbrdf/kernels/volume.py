@@ -44,12 +44,16 @@ def internal_reflectance(n, kappa):
     F_e = 2 integral R(c) c dc is the reflectance for diffuse light from outside; Walsh
     1926, S. Duntley, J. Opt. Soc. Am. 32, 61 (1942).
     """
-    external = 0.0
+    # From the rarer side there is no critical angle and the reflectance is smooth: from
+    # outside, or from inside itself where the outside is a denser liquid
+    dense = n >= 1.0 or kappa > 0.0
+    index = n if dense else 1.0 / n
+    diffuse = 0.0
     for k in range(len(NODES)):
         c = NODES[k]
-        reflected = facet_elements(c, (1.0 - c) * (1.0 + c), n, kappa)
-        external = external + WEIGHTS[k] * 2.0 * c * reflected[0]
-    return 1.0 - (1.0 - external) / (n * n)
+        reflected = facet_elements(c, (1.0 - c) * (1.0 + c), index, kappa)
+        diffuse = diffuse + WEIGHTS[k] * 2.0 * c * reflected[0]
+    return 1.0 - (1.0 - diffuse) / (n * n) if dense else diffuse
 
 
 @jit

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import quad
 
 from pbrdf import Film, GaussianSurface, HeightMap, Material, Scene, simulate
+from pbrdf.kernels.volume import internal_reflectance
 from tests.contaminants.scenes import (
     assert_closed,
     assert_within,
@@ -168,6 +170,46 @@ def test_c6_film_of_the_same_index_on_a_lambertian_base(rho, theta_deg, dhr):
                 result.brdf_total.isel(here)[k], result.brdf_total_stderr.isel(here)[k],
                 t_in * t_out * base,
             )  # fmt: skip
+
+
+def into_base(theta, n_film, n_base):
+    """Share of unpolarised light that a film lets into the base under it."""
+    cos_t = np.sqrt(1 - (np.sin(theta) / n_film) ** 2)
+    ratio = n_base / n_film
+    inner = np.linalg.inv(
+        np.eye(4) - reflection(cos_t, 1 / n_film) @ reflection(cos_t, ratio)
+    )
+    t12 = transmission(np.cos(theta), n_film)
+    return (transmission(cos_t, ratio) @ inner @ t12)[0, 0]
+
+
+@pytest.mark.parametrize("theta_deg", ANGLES)
+@pytest.mark.parametrize("n_base", [1.2, 1.7])
+def test_film_on_a_lambertian_base_of_another_index(theta_deg, n_base):
+    """By reciprocity the base sends out 1/n^2 of what it would get from a white sky."""
+    theta, rho = np.deg2rad(theta_deg), 0.6
+    mean, stderr, result = flat_runs(
+        Material(n_base, diffuse_albedo=rho), Film(thickness=0.1, material=WATER), theta,
+        n_rays=4000, n_theta=9, n_dphi=2,
+    )  # fmt: skip
+    # Even in the square of the sine, as light from a white sky is
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    sky = np.arcsin(np.sqrt(0.5 * (1 + nodes)))
+    sent = 0.5 * weights @ [into_base(t, 1.333, n_base) for t in sky] / n_base**2
+    specular = film_matrix(theta, 1.333, (n_base, 0.0))[0, 0]
+    diffuse = into_base(theta, 1.333, n_base) * rho * sent / (1 - rho * (1 - sent))
+    assert_within(mean[0, 0], stderr[0, 0], specular + diffuse, floor=2e-6)
+    clean_counters(result)
+
+
+@pytest.mark.parametrize("n", [0.7, 0.9, 1.1, 1.275, 2.0])
+def test_diffuse_light_inside_is_thrown_back_as_the_integral_says(n):
+    def share(square_of_sine):
+        return reflection(np.sqrt(1 - square_of_sine), 1 / n)[0, 0]
+
+    kink = [n**-2] if n > 1 else None
+    expected = quad(share, 0, 1, points=kink, limit=500)[0]
+    assert_allclose(internal_reflectance(n, 0.0), expected, atol=3e-8)
 
 
 ROUGH = GaussianSurface(shape=(64, 64), spacing=1.0, corr_length=8.0, slope_rms=0.2)
