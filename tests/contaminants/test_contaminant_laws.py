@@ -136,6 +136,20 @@ def test_skips_change_nothing(finite, contaminants):
     assert apart[..., 0, 0].mean() < 1e-3
 
 
+def test_a_ray_that_falls_more_slowly_than_the_ground_is_still_searched_for():
+    """Over a long roof: what lies ahead falls away first, and rises behind the valley."""
+    x = np.abs(np.arange(256.0) - 128.0)
+    roof = HeightMap(np.repeat(0.5 * x[:, None], 64, axis=1), 1.0, periodic=True)
+    high = Spheres.at([[128.0, 32.0, 120.0]], radius=4.0, material=WATER)
+    scene = Scene(roof, PAINT, high)
+    light, dark = (
+        simulate(scene, np.deg2rad(75.0), phi_i=np.pi, n_rays=3200, skips=skips)
+        for skips in (("walk", "steep", "horizon"), ("walk",))
+    )
+    assert_array_equal(light.brdf, dark.brdf)
+    clean_counters(light)
+
+
 def test_skips_are_explained():
     surface = GaussianSurface(shape=(64, 64), spacing=1.0, corr_length=8.0, slope_rms=0.2)
     said = [
