@@ -237,3 +237,15 @@ def test_a_sphere_in_slices_is_met_where_the_sphere_is():
         for t in expected:
             assert_allclose(np.linalg.norm(start + t * k), radius, atol=1e-9)
     assert met > 1000
+
+
+def test_every_body_keeps_its_own_material():
+    """From straight above a black sphere takes its shadow; one of air takes nothing."""
+    bodies = [
+        Spheres.at([[5.0, 5.0, 4.0]], radius=3.0, material=Material(1.0)),
+        Spheres.at([[14.0, 14.0, 4.0]], radius=2.0, material=Material.black()),
+    ]
+    scene = Scene(HeightMap.flat(size=(20.0, 20.0)), Material.mirror(), bodies)
+    result = simulate(scene, 0.0, n_rays=64_000)
+    assert_allclose(float(result.absorbed.squeeze()), np.pi * 2.0**2 / 400.0, atol=1e-3)
+    assert_allclose(float(result.albedo.sum()), 1.0 - np.pi * 2.0**2 / 400.0, atol=1e-3)
