@@ -14,15 +14,10 @@ from pbrdf.kernels.entry import TWO_PI, entry_line, first_ray, line_beam, wrap_i
 from pbrdf.kernels.frames import PARALLEL, turn_frame
 from pbrdf.kernels.heightfield import (
     ESCAPED,
-    FACET_HIGH,
-    FACET_LOW,
     HIT,
-    NEVER,
     SIDE,
-    corner_heights,
     facet_slopes,
     leave_facet,
-    plane_height,
     walk,
 )
 from pbrdf.kernels.random import uniform_pair
@@ -43,6 +38,7 @@ from pbrdf.kernels.shading import (
     tally_path,
 )
 from pbrdf.kernels.spectra import gather_path
+from pbrdf.kernels.sweep import F_FACET, F_I, F_J, F_U, F_V, F_Z, sweep_line
 
 MAX_STEPS = 10_000_000
 # Smallest cosine of a hit: rounding may leave a grazing ray parallel to the facet it meets
@@ -331,100 +327,19 @@ def trace_batch(terrain, tree, source, record, waiting, spectra, optics, tally):
 
 
 @jit(allocates=False)
-def sweep_batch(terrain, source, record, waiting, spectra, optics, tally):
+def sweep_batch(terrain, source, meetings, record, waiting, spectra, optics, tally):
     """`trace_batch` over a periodic field, without a search for the first facets.
 
-    The rays of a line travel in one vertical plane. There a ray is the line of constant
-    s + (z - z_top) tan(theta_i) / unit; the first point of the surface, in the direction of
-    the light, at which this lag reaches the ray's value is where the ray arrives. One pass
-    along the surface thus serves all rays of the line in their order.
+    `meetings` (rays of the longest line, N_FIRST) is room for `sweep_line` to write into.
     """
-    nx, ny = terrain.heights.shape
-    z_top = terrain.z_top
     for line in range(source.n_lines):
-        start_x, start_y, speed_x, speed_y, length, unit, offset, _, _ = entry_line(
-            line, source, terrain.pitch_x, terrain.pitch_y
-        )
         beam = line_beam(line, source)
-        _, _, sin_t, cos_t, _, _, _, _, _ = beam
         first = first_ray(line, source)
-        rays = first_ray(line + 1, source) - first
-        drift = sin_t / cos_t / unit  # in s per height
-        forward_x = speed_x >= 0.0
-        forward_y = speed_y >= 0.0
-        per_x = 1.0 / speed_x if speed_x != 0.0 else NEVER
-        per_y = 1.0 / speed_y if speed_y != 0.0 else NEVER
-        x0 = start_x
-        y0 = start_y
-        i = min(int(x0), nx - 1)
-        j = min(int(y0), ny - 1)
-        s = 0.0
-        ray = 0
-        lag = length * (offset / max(rays, 1))
-        while ray < rays:
-            t_x = (i + (1 if forward_x else 0) - x0) * per_x
-            t_y = (j + (1 if forward_y else 0) - y0) * per_y
-            s_out = max(min(t_x, t_y), s)
-            z00, z10, z01, z11 = corner_heights(terrain.heights, i, j, True)
-            highest = max(max(z00, z10), max(z01, z11))
-            if s_out + (highest - z_top) * drift >= lag:
-                # The light reaches into this cell: through its one or two facets
-                u_in = x0 + speed_x * s - i
-                v_in = y0 + speed_y * s - j
-                u_out = x0 + speed_x * s_out - i
-                v_out = y0 + speed_y * s_out - j
-                side_in = u_in - v_in
-                side_out = u_out - v_out
-                split = side_in * side_out < 0.0
-                side = side_in if split else side_in + side_out
-                facet = FACET_LOW if side > 0.0 else FACET_HIGH
-                s_a = s
-                u_a = u_in
-                v_a = v_in
-                for part in range(2):
-                    s_b = s_out
-                    if split and part == 0:
-                        s_b = s + (s_out - s) * (side_in / (side_in - side_out))
-                    u_b = x0 + speed_x * s_b - i
-                    v_b = y0 + speed_y * s_b - j
-                    z_a = plane_height(z00, z10, z01, z11, facet, u_a, v_a)
-                    z_b = plane_height(z00, z10, z01, z11, facet, u_b, v_b)
-                    lag_a = s_a + (z_a - z_top) * drift
-                    lag_b = s_b + (z_b - z_top) * drift
-                    while ray < rays and lag <= lag_b:
-                        share = 0.0
-                        if lag_b > lag_a:
-                            share = min(max((lag - lag_a) / (lag_b - lag_a), 0.0), 1.0)
-                        trace_ray(
-                            terrain, None, HIT, i, j, facet, u_a + share * (u_b - u_a),
-                            v_a + share * (v_b - v_a), z_a + share * (z_b - z_a),
-                            beam, source.stream, first + ray,
-                            record, waiting, spectra, optics, tally,
-                        )  # fmt: skip
-                        ray += 1
-                        lag = length * ((ray + offset) / rays)
-                    if not split:
-                        break
-                    facet = 1 - facet
-                    s_a = s_b
-                    u_a = u_b
-                    v_a = v_b
-
-            # Into the next cell, round the period
-            if t_x <= t_y:
-                i += 1 if forward_x else -1
-                if i == nx:
-                    i = 0
-                    x0 -= nx
-                elif i < 0:
-                    i = nx - 1
-                    x0 += nx
-            else:
-                j += 1 if forward_y else -1
-                if j == ny:
-                    j = 0
-                    y0 -= ny
-                elif j < 0:
-                    j = ny - 1
-                    y0 += ny
-            s = s_out
+        sweep_line(terrain, line, source, terrain.z_top, meetings)
+        for ray in range(first_ray(line + 1, source) - first):
+            trace_ray(
+                terrain, None, HIT, int(meetings[ray, F_I]), int(meetings[ray, F_J]),
+                int(meetings[ray, F_FACET]), meetings[ray, F_U], meetings[ray, F_V],
+                meetings[ray, F_Z], beam, source.stream, first + ray,
+                record, waiting, spectra, optics, tally,
+            )  # fmt: skip

@@ -71,13 +71,15 @@ def trace_sample(
             zenith, azimuth, tally.flux[index], tally.energy[index], tally.counts[index],
             np.zeros((4, 4)),
         )  # fmt: skip
+        # One pass along each line of entry points finds all first facets
+        walks = not isinstance(target, EmbreeField)
+        sweeps = walks and field.periodic and "sweep" in plan.skips
+        longest = -(-source.n_rays // source.n_lines) if sweeps else 0
+        meetings = np.empty((longest, N_FIRST))
         if isinstance(target, WetField):
-            sweeps = field.periodic and "sweep" in plan.skips
-            longest = -(-source.n_rays // source.n_lines) if sweeps else 0
             places = Room(
-                np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT),
-                np.empty((longest, N_FIRST)),
-            )  # fmt: skip
+                np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT), meetings
+            )
             trace_among_bodies(
                 target.world, source, field.terrain.z_top, plan.max_bounces,
                 plan.n_stokes, places, bins,
@@ -85,9 +87,10 @@ def trace_sample(
             continue
         shared = plan.spectrum
         light = shared.room(index, plan.max_bounces) if shared else NOTHING
-        if isinstance(target, Field) and field.periodic and "sweep" in plan.skips:
-            # One pass along each line of entry points finds all first facets
-            sweep_batch(field.terrain, source, record, waiting, light, optics, bins)
+        if sweeps:
+            sweep_batch(
+                field.terrain, source, meetings, record, waiting, light, optics, bins
+            )
         else:
             tree = None if isinstance(target, Field) else target.tree()
             trace_batch(field.terrain, tree, source, record, waiting, light, optics, bins)
