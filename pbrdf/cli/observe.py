@@ -123,13 +123,19 @@ def observe(
         geometry = _plane(theta_i, theta_view)
     else:
         geometry = _of_scan(scan, None if waves is None else waves[0])
-    azimuth = "uniform" if phi_i == "uniform" else options.numbers(phi_i, "--phi-i-deg")[0]
+    azimuth = options.azimuths(phi_i)
+    if isinstance(azimuth, list):
+        msg = (
+            f"--phi-i-deg must be one number or uniform here, got {len(azimuth)}. "
+            "Run observe once for each."
+        )
+        raise ValueError(msg)
     with staged_file(target_file, force=force) as stage:
         with progress_bar("observing") as progress:
             result = pbrdf.observe(
                 loaded,
                 *geometry,
-                phi_i=azimuth if isinstance(azimuth, str) else float(np.deg2rad(azimuth)),
+                phi_i=azimuth,
                 source_half_angle=float(np.deg2rad(source_half_angle)),
                 detector_half_angle=float(np.deg2rad(detector_half_angle)),
                 n_rays=n_rays,

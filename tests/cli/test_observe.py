@@ -58,6 +58,7 @@ def test_a_dataset_keeps_the_bounces_apart(folder: Path) -> None:
         (["--theta-view-deg", "89.9"], "above the horizon"),
         (["--theta-view-deg", "steep"], "--theta-view-deg must be numbers"),
         (["--wavelength-um", "0.5,0.6"], "must be one number for a scan"),
+        (["--phi-i-deg", "0,90"], "must be one number or uniform"),
         (["--estimator", "guess"], "guess"),
         (["--scan", "missing.csv"], "missing.csv"),
     ],
