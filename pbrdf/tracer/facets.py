@@ -3,7 +3,7 @@
 import numpy as np
 
 from pbrdf.kernels import observe_facets
-from pbrdf.kernels.observe_facets import Cones
+from pbrdf.kernels.observe_matrix import Cones, mean_mueller
 from pbrdf.tracer.field import GUARD_HEIGHTS, GUARD_SHARE, Field
 from pbrdf.tracer.look import Look, Sums, forward
 
@@ -129,7 +129,7 @@ def mean_matrices(look: Look) -> np.ndarray:
     out = np.zeros((look.size, *look.n.shape, look.n_stokes, look.n_stokes))
     room = np.empty((4, 4))
     for g in range(look.size):
-        observe_facets.mean_mueller(
+        mean_mueller(
             _cones(look, g, 0.0), DISC_RULE, look.optics, look.n_stokes, room, out[g]
         )
     return forward(out)
