@@ -187,4 +187,6 @@ def _height_log_variance(fit: AxisFit, square: float, loss: float) -> float:
 
     by_parameter = jacobian(left, fit.parameters)[0]
     gradient = gradient - by_parameter / (1 - loss) @ fit.response
-    return max(float(gradient @ fit.covariance @ gradient), 1e-12)
+    # To correct for noise and loss never makes the mean square itself better known
+    plain = float(fit.covariance[0, 0]) / fit.mean_square**2
+    return max(float(gradient @ fit.covariance @ gradient), plain)

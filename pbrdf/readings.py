@@ -100,10 +100,15 @@ class Readings:
         return np.concatenate([one, np.sqrt((one**2).sum(axis=1, keepdims=True))], axis=1)
 
     def rel_error(self) -> float:
-        """Largest standard error over M00 of geometries above a tenth of the brightest."""
+        """Largest standard error over M00 of geometries above a tenth of the brightest.
+
+        Infinite where nothing was seen but might have been.
+        """
         m00, stderr = self.mean[:, -1, :, 0, 0], self.stderr()[:, -1, :, 0, 0]
         bright = m00 > 0.1 * m00.max()
-        return float(np.max(stderr[bright] / m00[bright])) if bright.any() else 0.0
+        if not bright.any():
+            return np.inf if stderr.any() else 0.0
+        return float(np.max(stderr[bright] / m00[bright]))
 
 
 def _and_total(by_bounces: np.ndarray) -> np.ndarray:

@@ -230,9 +230,14 @@ class Moments:
         return np.mean(self._energy, axis=0)
 
     def rel_error(self) -> float:
-        """Largest standard error over M00 of the bins above a tenth of the peak."""
+        """Largest standard error over M00 of the bins above a tenth of the peak.
+
+        Infinite where nothing was seen but might have been.
+        """
         m00 = (..., slice(1), slice(1))
         mean, scatter = self._mean_total[m00].copy(), self._scatter_total[m00].copy()
         self._estimate(mean, scatter, self._one_of_all())
         bright = mean > 0.1 * mean.max(axis=(2, 3), keepdims=True)
-        return float(np.max(scatter[bright] / mean[bright])) if bright.any() else 0.0
+        if not bright.any():
+            return np.inf if scatter.any() else 0.0
+        return float(np.max(scatter[bright] / mean[bright]))
