@@ -6,7 +6,7 @@ from math import pi
 import numpy as np
 
 from . import jit
-from .fresnel import facet_elements, transmission_parts
+from .fresnel import facet_elements, select, transmission_parts
 
 __all__ = [
     "BASE",
@@ -46,14 +46,14 @@ def internal_reflectance(n, kappa):
     """
     # From the rarer side there is no critical angle and the reflectance is smooth: from
     # outside, or from inside itself where the outside is a denser liquid
-    dense = n >= 1.0 or kappa > 0.0
-    index = n if dense else 1.0 / n
+    rarer = select(n < 1.0, kappa == 0.0, False)
+    index = select(rarer, 1.0 / n, n)
     diffuse = 0.0
     for k in range(len(NODES)):
         c = NODES[k]
         reflected = facet_elements(c, (1.0 - c) * (1.0 + c), index, kappa)
         diffuse = diffuse + WEIGHTS[k] * 2.0 * c * reflected[0]
-    return 1.0 - (1.0 - diffuse) / (n * n) if dense else diffuse
+    return select(rarer, diffuse, 1.0 - (1.0 - diffuse) / (n * n))
 
 
 @jit
