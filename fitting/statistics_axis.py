@@ -189,4 +189,5 @@ def _height_log_variance(fit: AxisFit, square: float, loss: float) -> float:
     gradient = gradient - by_parameter / (1 - loss) @ fit.response
     # To correct for noise and loss never makes the mean square itself better known
     plain = float(fit.covariance[0, 0]) / fit.mean_square**2
-    return max(float(gradient @ fit.covariance @ gradient), plain)
+    least = max(plain, 2.0 / fit.extent.n_points)
+    return max(float(gradient @ fit.covariance @ gradient), least)

@@ -103,8 +103,9 @@ class AxisFit:
         """Variance of ln(quantity(parameters) · mean_square^direct), to first order."""
         gradient = _gradient(lambda t: np.log(quantity(t)), self.parameters) @ self.response
         gradient[0] += direct / self.mean_square
-        # First order in large scatter may cancel; no quantity is known to 1e-6
-        return max(float(gradient @ self.covariance @ gradient), 1e-12)
+        # First order in large scatter may cancel; n heights know a variance to 2/n at best
+        least = 2.0 / self.extent.n_points
+        return max(float(gradient @ self.covariance @ gradient), least)
 
     def correlation_at(self, parameters: Array) -> Correlation:
         """Autocorrelation for another parameter vector."""
