@@ -29,31 +29,21 @@ def to_pointer(typing_context, address):
     return types.voidptr(types.intp), generate
 
 
-@intrinsic
-def to_address(typing_context, pointer):
-    """Address of a pointer."""
-
-    def generate(context, builder, signature, arguments):
-        return builder.ptrtoint(arguments[0], ir.IntType(64))
-
-    return types.intp(types.voidptr), generate
-
-
 def recorder(intersect, rays, count):
     """Make a function that writes rays down and passes them on to `intersect`."""
     size = len(rays)
     rays_at, count_at = rays.ctypes.data, count.ctypes.data
 
-    @cfunc(types.void(types.voidptr, types.voidptr, types.voidptr))
+    @cfunc(types.void(types.intp, types.intp, types.intp))
     def record(scene, place, arguments):
-        ray = carray(place, (N_WORDS,), dtype=np.float32)
+        ray = carray(to_pointer(place), (N_WORDS,), dtype=np.float32)
         room = carray(to_pointer(rays_at), (size, 6), dtype=np.float32)
         number = carray(to_pointer(count_at), (1,), dtype=np.int64)
         for c in range(3):
             room[number[0], c] = ray[c]
             room[number[0], 3 + c] = ray[DIRECTION + c]
         number[0] += 1
-        call_embree(intersect, to_address(scene), to_address(place))
+        call_embree(intersect, scene, place)
 
     return record
 

@@ -14,43 +14,32 @@ import pbrdf
 MIRROR_DEGREES = (10, 20, 30, 40, 50, 60, 70, 80, 85)
 
 
-def peak_of_rays(n_rays):
-    """Memory and time of one run of many rays, all 16 elements."""
-    drawn = pbrdf.GaussianSurface(
-        shape=(512, 512), spacing=1.0, corr_length=16.0, slope_rms=0.30
-    )
-    scene = pbrdf.Scene(drawn.sample(1), pbrdf.Material(1.5))
-    start = time.perf_counter()
-    pbrdf.simulate(scene, np.deg2rad(60.0), n_rays=n_rays)
-    report(f"{n_rays:.0e} rays", time.perf_counter() - start)
-
-
-def peak_of_cells(nodes):
-    """Memory and time of a large surface: drawn, traced by 32 batches, mesh-free."""
+def peak(what, nodes, n_rays, **options):
+    """Memory and time of one fixed surface: drawn, and traced with all 16 elements."""
     start = time.perf_counter()
     drawn = pbrdf.GaussianSurface(
         shape=(nodes, nodes), spacing=1.0, corr_length=16.0, slope_rms=0.30
     )
     scene = pbrdf.Scene(drawn.sample(1), pbrdf.Material(1.5))
-    pbrdf.simulate(scene, np.deg2rad(60.0), n_rays=1_000_000)
-    report(f"{nodes} x {nodes} cells", time.perf_counter() - start)
+    pbrdf.simulate(scene, np.deg2rad(60.0), n_rays=n_rays, **options)
+    seconds = time.perf_counter() - start
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    print(f"  {what:28s} peak memory {memory:6.2f} GB, {seconds:7.1f} s", flush=True)
+
+
+def peak_of_rays(n_rays):
+    """Run many rays."""
+    peak(f"{n_rays:.0e} rays", 512, n_rays)
+
+
+def peak_of_cells(nodes):
+    """Run a large surface, mesh-free."""
+    peak(f"{nodes} x {nodes} cells", nodes, 1_000_000)
 
 
 def peak_with_embree(nodes):
     """Run a surface with every skip off: mesh and tree included."""
-    start = time.perf_counter()
-    drawn = pbrdf.GaussianSurface(
-        shape=(nodes, nodes), spacing=1.0, corr_length=16.0, slope_rms=0.30
-    )
-    scene = pbrdf.Scene(drawn.sample(1), pbrdf.Material(1.5))
-    pbrdf.simulate(scene, np.deg2rad(60.0), n_rays=320_000, skips=False)
-    report(f"{nodes} x {nodes} cells, Embree", time.perf_counter() - start)
-
-
-def report(what, seconds):
-    """Print one line of memory and time."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    print(f"  {what:28s} peak memory {peak:6.2f} GB, {seconds:7.1f} s", flush=True)
+    peak(f"{nodes} x {nodes} cells, Embree", nodes, 320_000, skips=False)
 
 
 def mirror(n_rays):

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import (
     Drops,
@@ -18,6 +17,7 @@ from pbrdf import (
 )
 from tests.contaminants.scenes import clean_counters
 from tests.contaminants.test_films import film_matrix
+from tests.mirror_images import assert_folded
 from tests.source_disc import assert_answers_disc, disc, mirrored_disc
 
 WATER, PAINT = Material(1.333), Material(1.5, diffuse_albedo=0.2)
@@ -25,7 +25,6 @@ ALUMINIUM = (0.958, 6.69)
 SOURCE = np.deg2rad(40.0)
 ROUGH = GaussianSurface(shape=(64, 64), spacing=1.0, corr_length=8.0, slope_rms=0.3)
 DEW = {"contact_angle": 1.2, "coverage": 0.25, "number_density": 4e-3, "material": WATER}
-ODD = np.array([[0, 0, 1, 1], [0, 0, 1, 1], [1, 1, 0, 0], [1, 1, 0, 0]], dtype=bool)
 # Slopes of 0.3 contradict most contact angles, which is not at issue here
 pytestmark = pytest.mark.filterwarnings("ignore::pbrdf.errors.AccuracyWarning")
 
@@ -94,12 +93,7 @@ def folded(seed, fold, contaminants=(), surface=ROUGH):
 def test_folding_averages_each_bin_with_its_mirror_image(flat):
     surface = HeightMap.flat(size=(96.0, 80.0)) if flat else ROUGH
     plain, fold = (folded(3, one, surface=surface) for one in (False, True))
-    mirror = (-np.arange(12)) % 12
-    sign = np.where(ODD, -1.0, 1.0)
-    image = plain.brdf.isel(dphi=mirror).values * sign
-    assert_allclose(fold.brdf, 0.5 * (plain.brdf.values + image), atol=1e-12)
-    assert_array_equal(fold.brdf.values, fold.brdf.isel(dphi=mirror).values * sign)
-    assert_allclose(fold.albedo, plain.albedo, rtol=1e-12)
+    assert_folded(fold, plain)
 
 
 def test_folded_runs_agree_with_others_and_state_half_the_variance():

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
+from tests.mirror_images import assert_folded, image_of
 from tests.source_disc import assert_answers_disc, disc, mirrored_disc
 
 ALUMINIUM = Material(0.958, 6.69)
@@ -111,7 +111,6 @@ def test_sources_and_folds_that_make_no_sense_are_refused(options, message):
 
 
 ISOTROPIC = GaussianSurface(shape=(96, 96), spacing=1.0, corr_length=8.0, slope_rms=0.3)
-ODD = np.array([[0, 0, 1, 1], [0, 0, 1, 1], [1, 1, 0, 0], [1, 1, 0, 0]], dtype=bool)
 
 
 def folded(seed, fold, **options):
@@ -123,16 +122,12 @@ def folded(seed, fold, **options):
 
 def test_folding_averages_each_bin_with_its_mirror_image():
     plain, fold = folded(3, False), folded(3, True)
-    mirror = (-np.arange(12)) % 12
-    sign = np.where(ODD, -1.0, 1.0)
-    image = plain.brdf.isel(dphi=mirror).values * sign
-    assert_allclose(fold.brdf, 0.5 * (plain.brdf.values + image), atol=1e-12)
-    assert_array_equal(fold.brdf.values, fold.brdf.isel(dphi=mirror).values * sign)
-    assert_allclose(fold.albedo, plain.albedo, rtol=1e-12)
+    assert_folded(fold, plain)
     # The image is an estimate of the same thing: unfolded, the two agree within errors
-    error = np.hypot(plain.brdf_stderr, plain.brdf_stderr.isel(dphi=mirror).values)
+    stderr = plain.brdf_stderr
+    error = np.hypot(stderr, np.abs(image_of(stderr)))
     off_axis = [1, 2, 3, 4, 5]
-    z = ((plain.brdf.values - image) / np.where(error > 0, error, np.inf))[
+    z = ((plain.brdf.values - image_of(plain.brdf)) / np.where(error > 0, error, np.inf))[
         :, :, :, off_axis
     ]
     assert np.abs(z).max() < 6.0
