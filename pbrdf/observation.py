@@ -16,6 +16,7 @@ import pbrdf
 from pbrdf import arguments
 from pbrdf.analytic.geometry import flat_geometry
 from pbrdf.errors import AccuracyWarning
+from pbrdf.kernels.shading import N_LEAKED
 from pbrdf.readings import Readings, as_scan, to_dataset
 from pbrdf.results import scene_text
 from pbrdf.scene import Scene
@@ -24,6 +25,7 @@ from pbrdf.tracer.field import Field
 from pbrdf.tracer.look import Look, Sight
 from pbrdf.tracer.observer import look_at
 from pbrdf.tracer.schedule import gather
+from pbrdf.validity import lost_ray_warnings
 
 __all__ = ["ESTIMATORS", "as_scan", "observe"]
 
@@ -226,6 +228,9 @@ def observe(  # noqa: PLR0913  (the public signature)
         draw, root, seen.add, seen.rel_error, samples=samples, target=target,
         workers=arguments.worker_count(workers), progress=progress,
     )  # fmt: skip
+    for note in (late := lost_ray_warnings(int(seen.counts[N_LEAKED]), seen.bundles)):
+        warnings.warn(note, AccuracyWarning, stacklevel=2)
+    notes += late
     return to_dataset(
         seen,
         wavelength=waves,

@@ -11,6 +11,7 @@ import xarray as xr
 
 from pbrdf import arguments
 from pbrdf.errors import AccuracyWarning
+from pbrdf.kernels.shading import N_LEAKED
 from pbrdf.results import to_dataset
 from pbrdf.scene import Contamination, Scene, Surface
 from pbrdf.surface import HeightMap
@@ -21,7 +22,7 @@ from pbrdf.tracer.schedule import gather
 from pbrdf.tracer.skips import chosen_skips, explanation
 from pbrdf.tracer.trace import prepare, trace_sample
 from pbrdf.tracer.world import WetField, contaminant_materials, media_of
-from pbrdf.validity import contamination_warnings
+from pbrdf.validity import contamination_warnings, lost_ray_warnings
 
 # Where paths are cut: on a clean surface, and where transparent bodies may catch light
 MOST_BOUNCES, MOST_EVENTS = 64, 1024
@@ -113,8 +114,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
     Warns
     -----
     AccuracyWarning
-        If realisations are too few for honest standard errors, or geometric optics fails at
-        the wavelength.
+        If realisations are too few for honest standard errors, geometric optics fails at
+        the wavelength, or rays were lost by a fault.
 
     Notes
     -----
@@ -199,7 +200,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
         samples=samples, target=target, workers=arguments.worker_count(workers),
         progress=progress,
     )  # fmt: skip
-    for note in (late := _contamination_notes(moments[0], waves)):
+    for note in (late := _late_notes(moments, waves)):
         warnings.warn(note, AccuracyWarning, stacklevel=2)
     notes += late
     return to_dataset(
@@ -227,12 +228,15 @@ def simulate(  # noqa: PLR0913  (the public signature)
     )
 
 
-def _contamination_notes(moments: Moments, waves: np.ndarray | None) -> list[str]:
-    """Warnings of what lies on the surface, known after the first sample."""
-    late = list(moments.notes)
+def _late_notes(moments: Sequence[Moments], waves: np.ndarray | None) -> list[str]:
+    """Warnings of what lies on the surface and of lost rays, known only after tracing."""
+    first = moments[0]
+    late = list(first.notes)
     for wave in () if waves is None else np.atleast_1d(waves):
-        late += contamination_warnings(moments.reports, float(wave))
-    return late
+        late += contamination_warnings(first.reports, float(wave))
+    lost = sum(int(one.counts[:, N_LEAKED].sum()) for one in moments)
+    rays = first.plan.n_rays * first.samples * len(first.plan.theta_i) * len(moments)
+    return late + lost_ray_warnings(lost, rays)
 
 
 def _realize(

@@ -1,4 +1,7 @@
-"""Where geometric optics stops to hold for a rough surface; warnings, never corrections."""
+"""Where a result is not to be trusted: geometric optics fails, or the tracing lost rays.
+
+Warnings, never corrections.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,6 +14,8 @@ from pbrdf.surface import GaussianSurface, MeasuredSurface
 LEAST_SIZE_PARAMETER = 400.0
 # Bandwidth of a filter radiometer, where nothing is known of the detector [um]
 BANDWIDTH = 0.01
+# Share of the rays that rounding may lose: some in ten million, hazard B4
+MOST_LOST = 1e-6
 
 
 def geometric_optics_warnings(
@@ -90,3 +95,30 @@ bandwidth of 0.01 um: it interferes, which geometric optics does not know.
                 f"{bandwidth:g} um: it interferes, which geometric optics does not know."
             )
     return found
+
+
+def lost_ray_warnings(lost: int, rays: int) -> list[str]:
+    """Say that more rays were lost by a fault of the tracing than rounding explains.
+
+    Parameters
+    ----------
+    lost : int
+        Rays that fell through the surface or met a boundary from the wrong side.
+    rays : int
+        Rays traced in all.
+
+    Examples
+    --------
+    >>> lost_ray_warnings(3, 10_000_000)
+    []
+    >>> print(*lost_ray_warnings(2000, 16_000))
+    2000 of 16000 rays were lost by a fault of the tracing: the result lacks their light, \
+do not use it.
+    """
+    # A lone ray of a short run tells nothing
+    if lost <= max(3.0, MOST_LOST * rays):
+        return []
+    return [
+        f"{lost} of {rays} rays were lost by a fault of the tracing: the "
+        "result lacks their light, do not use it."
+    ]

@@ -7,6 +7,7 @@ ray instead, without a pass over memory before and after.
 import ctypes
 import functools
 import importlib.metadata
+import threading
 import weakref
 from dataclasses import dataclass
 
@@ -25,6 +26,8 @@ FORMAT_UINT3, FORMAT_FLOAT3 = 0x5003, 0x9003
 SCENE_ROBUST = 1 << 2
 ALIGNMENT = 64
 
+# A scene takes no geometry of another device, and a cache alone lets two threads make one
+_DEVICE_LOCK = threading.Lock()
 _HANDLE = ctypes.c_void_p
 _NUMBER = ctypes.c_uint
 _SIGNATURES = {
@@ -73,14 +76,19 @@ def library() -> ctypes.CDLL:
 
 
 @functools.cache
-def device() -> int:
-    """Embree's device, one for the whole program."""
+def _make_device() -> int:
     made: int = library().rtcNewDevice(None)
     version = library().rtcGetDeviceProperty(made, PROPERTY_VERSION)
     if version // 10_000 != EMBREE:
         msg = f"The Embree route needs Embree {EMBREE}, got version number {version}."
         raise RuntimeError(msg)
     return made
+
+
+def device() -> int:
+    """Embree's device, one for the whole program, whichever threads ask for it first."""
+    with _DEVICE_LOCK:
+        return _make_device()
 
 
 def build_tree(mesh: Mesh) -> int:
@@ -91,10 +99,10 @@ def build_tree(mesh: Mesh) -> int:
     RuntimeError
         If Embree reports an error, for one too little memory.
     """
-    embree = library()
-    scene: int = embree.rtcNewScene(device())
+    embree, home = library(), device()
+    scene: int = embree.rtcNewScene(home)
     embree.rtcSetSceneFlags(scene, SCENE_ROBUST)
-    geometry = embree.rtcNewGeometry(device(), GEOMETRY_TRIANGLES)
+    geometry = embree.rtcNewGeometry(home, GEOMETRY_TRIANGLES)
     for kind, form, array in (
         (BUFFER_VERTEX, FORMAT_FLOAT3, mesh.vertices),
         (BUFFER_INDEX, FORMAT_UINT3, mesh.faces),
@@ -109,7 +117,7 @@ def build_tree(mesh: Mesh) -> int:
     embree.rtcAttachGeometry(scene, geometry)
     embree.rtcReleaseGeometry(geometry)
     embree.rtcCommitScene(scene)
-    error = embree.rtcGetDeviceError(device())
+    error = embree.rtcGetDeviceError(home)
     if error:
         embree.rtcReleaseScene(scene)
         msg = f"Embree built no tree over {len(mesh.faces)} faces: error {error}."

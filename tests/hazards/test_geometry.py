@@ -1,5 +1,9 @@
 """Hazards B1 to B6: self hits, offsets, coordinates, edges, boundaries, grazing light."""
 
+import contextlib
+import functools
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +11,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
+from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels import jit
 from pbrdf.kernels.embree import first_face
 from pbrdf.kernels.heightfield import HIT, walk
@@ -253,3 +258,42 @@ def test_b06_grazing_bins_converge_with_the_cells_of_a_correlation_length():
     apart = np.abs(np.subtract(*found))
     # Expected moves with the cell size: -2e-5, -1.6e-4, +1.8e-4
     assert (apart < 5 * np.hypot(*errors) + 5e-4).all(), (apart, errors)
+
+
+class SlowToStart:
+    """Embree's library, whose devices wait until another thread asks for one as well."""
+
+    def __init__(self, library):
+        self.library = library
+        self.second = threading.Barrier(2)
+
+    def __getattr__(self, name):
+        return getattr(self.library, name)
+
+    def rtcNewDevice(self, config):
+        with contextlib.suppress(threading.BrokenBarrierError):
+            self.second.wait(timeout=1.0)
+        return self.library.rtcNewDevice(config)
+
+
+def test_threads_that_start_embree_at_once_share_one_device(monkeypatch):
+    """A geometry of one device in a scene of another made a tree that no ray hits."""
+    slow = SlowToStart(embree.library())
+    monkeypatch.setattr(embree, "library", lambda: slow)
+    made = functools.cache(embree._make_device.__wrapped__)
+    monkeypatch.setattr(embree, "_make_device", made)
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(lambda _: embree.device(), range(2))
+    assert first == second
+
+
+def test_losing_rays_is_warned_of(monkeypatch):
+    def without_faces(mesh):
+        return build(replace(mesh, faces=mesh.faces[:0]))
+
+    build = embree.build_tree
+    monkeypatch.setattr(embree, "build_tree", without_faces)
+    with pytest.warns(AccuracyWarning, match="19200 of 19200 rays were lost"):
+        result = trace(gaussian(0.05).sample(2), skips=False)
+    assert_allclose(result.leaked, 1.0)
+    assert "do not use it" in result.attrs["warnings"][-1]
