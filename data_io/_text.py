@@ -1,40 +1,23 @@
 """Text files in, with a line number for everything that is wrong in them."""
 
 import re
-import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from data_io._files import read_texts
+from data_io._notation import DECIMAL, plain_notation, unquoted
+from data_io._units import LENGTH_UNITS, normalise_unit
 from pbrdf.errors import DataFileError
 
-
-class MissingUnitWarning(UserWarning):
-    """A file names no length unit and none was given: micrometres are assumed."""
-
-
 COMMENT_MARKS = ("#", "%")
-ZIP_MAGIC = b"PK\x03\x04"
 
-# Sizes of the length units that headers and callers may name. [um]
-LENGTH_UNITS = {
-    "pm": 1e-6,
-    "angstrom": 1e-4,
-    "å": 1e-4,
-    "nm": 1e-3,
-    "um": 1.0,
-    "micron": 1.0,
-    "microns": 1.0,
-    "mm": 1e3,
-    "cm": 1e4,
-    "m": 1e6,
-}
-KNOWN_UNITS = "nm, um, mm, m"
-
-# A unit in a header stands after an underscore (x_um) or in brackets: z [nm], z (nm)
-_UNIT_IN_HEADER = re.compile(r"_([A-Za-zµμÅå]+)\b|[\[(]\s*([A-Za-zµμÅå]+)\s*[\])]")
+# What programs write for a point without height
+_MISSING = re.compile(
+    r"no[ _]?data|\*{2,}|-{2,}|-?1\.#\w+|-?nan\(\w+\)|\bbad\b", re.IGNORECASE
+)
 
 
 class Line(NamedTuple):
@@ -65,49 +48,9 @@ class Rows(NamedTuple):
         return cls(*(list(part) for part in zip(*lines, strict=True)))
 
 
-def read_bytes(path: str | Path) -> bytes:
-    """Return the content of a file that exists and is not empty."""
-    try:
-        content = Path(path).read_bytes()
-    except FileNotFoundError as error:
-        problem = "expected a file, found none of that name"
-        raise DataFileError(path, problem, "Check the path.") from error
-    except OSError as error:
-        problem = f"expected a readable file, got: {error.strerror}"
-        raise DataFileError(path, problem, "Check path and permissions.") from error
-    if not content.strip():
-        problem = "expected data, the file is empty"
-        raise DataFileError(path, problem, "Export it again from its source.")
-    return content
-
-
 def read_lines(path: str | Path) -> list[Line]:
     """Return all lines of a text file; refuse an empty or a binary one."""
     return [Line(i, text) for i, text in enumerate(read_texts(path), start=1)]
-
-
-def read_texts(path: str | Path) -> list[str]:
-    """Return the text of all lines of a file; refuse an empty or a binary one."""
-    content = read_bytes(path)
-    problem = "expected a text file, found binary data"
-    cure = "Give the text export of the instrument."
-    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        encoding = "utf-16"
-    elif b"\x00" in content:
-        raise DataFileError(path, problem, cure)
-    else:
-        encoding = "utf-8-sig"
-    try:
-        text = content.decode(encoding)
-    except UnicodeDecodeError as error:
-        # Instruments write a Latin-1 "µm" into otherwise plain text; anything with
-        # control characters is no text at all
-        text = content.decode("latin-1")
-        if re.search(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]", text):
-            raise DataFileError(path, problem, cure) from error
-    if re.search(r"[\x00-\x08\x0e-\x1f]", text):
-        raise DataFileError(path, problem, cure)
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 def is_comment(line: Line) -> bool:
@@ -126,7 +69,32 @@ def is_number(cell: str) -> bool:
 
 def find_delimiter(line: Line) -> str | None:
     """Return the separator of a line: comma, semicolon or tab, else None for spaces."""
+    words = line.text.split()
+    if len(words) > 1 and all(map(DECIMAL.fullmatch, words)):
+        return "\t" if "\t" in line.text else None
     return next((mark for mark in (";", "\t", ",") if mark in line.text), None)
+
+
+def column_names(header: list[Line], first: Line) -> list[str] | None:
+    """Return the names over the columns, if the header has them.
+
+    A line of units under a line of names belongs to the names.
+    """
+    delimiter = find_delimiter(first)
+    width = len(first.cells(delimiter))
+    rows = []
+    for line in header[-2:]:
+        text = line.text.strip().lstrip("".join(COMMENT_MARKS)).strip()
+        rows.append(Line(line.number, text.rstrip(delimiter)).cells(delimiter))
+    if not rows or len(rows[-1]) != width:
+        return None
+    if len(rows) == 2 and len(rows[0]) == width and all(map(_is_unit, rows[1])):
+        return [f"{name} [{unit.strip('[]() ')}]" for name, unit in zip(*rows, strict=True)]
+    return rows[-1]
+
+
+def _is_unit(cell: str) -> bool:
+    return normalise_unit(cell.strip("[]() ")) in LENGTH_UNITS
 
 
 def split_header(path: str | Path) -> tuple[list[Line], Rows]:
@@ -135,33 +103,54 @@ def split_header(path: str | Path) -> tuple[list[Line], Rows]:
     Data begin at the first line that starts with a number; blank lines and comments among
     them are dropped.
     """
-    texts = read_texts(path)
-    header: list[Line] = []
-    start = len(texts)
-    for i, text in enumerate(texts):
-        line = Line(i + 1, text)
-        if not text.strip():
-            continue
-        if not is_comment(line) and is_number(line.cells(find_delimiter(line))[0]):
-            start = i
-            break
-        header.append(line)
+    texts = unquoted(read_texts(path))
+    start = next((i for i, text in enumerate(texts) if _is_data(text)), len(texts))
+    header = [
+        Line(i, text) for i, text in enumerate(texts[:start], start=1) if text.strip()
+    ]
     numbers = [
         i
         for i, text in enumerate(texts[start:], start=start + 1)
         if (stripped := text.lstrip()) and not stripped.startswith(COMMENT_MARKS)
     ]
+    # Some formats begin with the number of points
+    if len(numbers) > 2 and texts[numbers[0] - 1].strip() == str(len(numbers) - 1):
+        header.append(Line(numbers[0], texts[numbers[0] - 1]))
+        numbers = numbers[1:]
     if not numbers:
         raise DataFileError(
             path,
             "expected lines of numbers, found none",
-            "Give columns of numbers separated by commas, semicolons, tabs or spaces.",
+            "Give columns of numbers separated by comma, semicolon, tab or space, "
+            "without separators of thousands.",
         )
-    return header, Rows(numbers, [texts[i - 1] for i in numbers])
+    rows = Rows(numbers, [texts[i - 1] for i in numbers])
+    return header, rows._replace(
+        texts=plain_notation(path, rows.texts, find_delimiter(rows.first))
+    )
+
+
+def _is_data(text: str) -> bool:
+    """Tell whether a line begins with a number, or is a row that begins with a gap."""
+    line = Line(0, text)
+    if not text.strip() or is_comment(line):
+        return False
+    delimiter = find_delimiter(line)
+    cells = line.cells(delimiter)
+    if is_number(cells[0]) or DECIMAL.fullmatch(cells[0]):
+        return True
+    cells = Line(0, _MISSING.sub("nan", text)).cells(delimiter)
+    return (
+        len(cells) > 1 and all(is_number(cell) or not cell for cell in cells) and any(cells)
+    )
 
 
 def read_numbers(
-    path: str | Path, data: Rows, names: Sequence[str] | None = None
+    path: str | Path,
+    data: Rows,
+    names: Sequence[str] | None = None,
+    *,
+    gaps: bool = False,
 ) -> np.ndarray:
     """Return a rectangular block of numbers, shape (lines, columns); NaN passes.
 
@@ -173,6 +162,8 @@ def read_numbers(
         Lines that hold numbers and nothing else.
     names : sequence of str, optional
         Column names for the error message; numbers from 1 by default.
+    gaps : bool
+        Read empty cells and marks such as "No Data" and "***" as NaN.
 
     Raises
     ------
@@ -180,13 +171,29 @@ def read_numbers(
         Naming the first line and column that is not a number or is missing.
     """
     delimiter = find_delimiter(data.first)
-    try:
-        block = np.loadtxt(data.texts, delimiter=delimiter, comments=None, ndmin=2)
-    except ValueError:
-        block = None
+    block = _block(data.texts, delimiter)
+    if block is None and gaps:
+        data = data._replace(texts=[_with_nan(text, delimiter) for text in data.texts])
+        block = _block(data.texts, delimiter)
     if block is not None and not np.isinf(block).any():
         return block
     raise _first_fault(path, data, delimiter, names)
+
+
+def _block(texts: list[str], delimiter: str | None) -> np.ndarray | None:
+    """Return a rectangular block of numbers, or None."""
+    try:
+        return np.loadtxt(texts, delimiter=delimiter, comments=None, ndmin=2)
+    except ValueError:
+        return None
+
+
+def _with_nan(text: str, delimiter: str | None) -> str:
+    """Return a line with nan for what marks a missing point."""
+    text = _MISSING.sub("nan", text)
+    if delimiter is None:
+        return text
+    return delimiter.join(cell.strip() or "nan" for cell in text.split(delimiter))
 
 
 def _first_fault(
@@ -197,7 +204,9 @@ def _first_fault(
 ) -> DataFileError:
     """Locate what made a block of numbers unreadable."""
     width = len(data.first.cells(delimiter))
-    cure = "Columns are separated by comma, semicolon, tab or space; decimals have a point."
+    cure = (
+        "Columns are separated by comma, semicolon, tab or space; one notation of decimals."
+    )
     for line in map(Line, data.numbers, data.texts):
         cells = line.cells(delimiter)
         for i, cell in enumerate(cells):
@@ -213,38 +222,3 @@ def _first_fault(
                 path, problem, "The row is truncated or has extra cells.", line=line.number
             )
     return DataFileError(path, "expected a table of numbers", cure)
-
-
-def normalise_unit(name: str) -> str:
-    """Return a length unit in lower case and with a plain u for micro."""
-    return name.strip().replace("µ", "u").replace("μ", "u").lower()
-
-
-def unit_factor(name: str) -> float:
-    """Return the size of a length unit named by the caller. [um]"""
-    key = normalise_unit(name)
-    if key not in LENGTH_UNITS:
-        msg = f"unit must be one of {KNOWN_UNITS}, got {name!r}. Name the unit in the file."
-        raise ValueError(msg)
-    return LENGTH_UNITS[key]
-
-
-def warn_missing_unit(path: str | Path, *, stacklevel: int) -> None:
-    """Say that a file without unit is taken as micrometres."""
-    msg = (
-        f"{Path(path).name}: no length unit is named, micrometres are assumed. "
-        "Name units in the header (x_um,z_um), or give unit=."
-    )
-    warnings.warn(msg, MissingUnitWarning, stacklevel=stacklevel)
-
-
-def header_units(text: str) -> list[str]:
-    """Return the length units a header line names, in order of appearance.
-
-    Examples
-    --------
-    >>> header_units("# x_um, z [nm] (dx assumed)")
-    ['um', 'nm']
-    """
-    found = (normalise_unit(a or b) for a, b in _UNIT_IN_HEADER.findall(text))
-    return [unit for unit in found if unit in LENGTH_UNITS]

@@ -5,12 +5,17 @@ optional dependency, the extra ``pbrdf[formats]``.
 """
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from data_io._text import LENGTH_UNITS, normalise_unit
+from data_io._files import NotAMapError
+from data_io._units import LENGTH_UNITS, normalise_unit, unit_factor
+from data_io.channels import choose_channel
+from data_io.sur import plain_sur
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
 
@@ -23,45 +28,107 @@ INSTRUMENT_SUFFIXES = {
     ".vk3",
     ".vk4",
     ".vk6",
+    ".vk7",
+    ".plux",
     ".gwy",
     ".spm",
 }
 
 
-def read_instrument_map(path: str | Path) -> HeightMap:
+_NO_HEIGHT = 1e30
+
+
+def read_instrument_map(
+    path: str | Path,
+    *,
+    spacing: float | tuple[float, float] | None = None,
+    unit: str | None = None,
+    channel: int | str | None = None,
+) -> HeightMap:
     """Read the height map of an instrument's file; missing points become NaN. [um]
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    spacing : float or (float, float), optional
+        Grid steps, only for a file that names none. [um]
+    unit : str, optional
+        Length unit, only for a file that names none.
+    channel : int or str, optional
+        Which channel of the file, by number or name; the first of heights by default.
 
     Raises
     ------
     DataFileError
         If SurfaceTopography is not installed or cannot read the file, or if the file holds
-        a profile or names no length unit.
+        a profile or lacks grid steps or unit.
     """
-    topography = _open(Path(path))
-    if topography.dim != 2:
-        problem = "expected a map, got a profile"
-        raise DataFileError(path, problem, "Read it with read_profile.")
-    factor = _factor(path, topography)
+    topography, factor = _read(Path(path), spacing, unit, channel)
+    if topography.dim != 2 or min(topography.nb_grid_pts) < 2:
+        raise NotAMapError(path, int(np.prod(topography.nb_grid_pts)))
     size_x, size_y = topography.physical_sizes
     nx, ny = topography.nb_grid_pts
-    heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
     # The package lists heights[x, y], as HeightMap does
-    return HeightMap(heights * factor, (size_x / nx * factor, size_y / ny * factor))
+    heights = _filled(topography.heights()) * factor
+    if not np.isfinite(heights).any():
+        problem = "expected heights, every point is marked missing"
+        raise DataFileError(path, problem, "Export the map again.")
+    return HeightMap(heights, (size_x / nx * factor, size_y / ny * factor))
 
 
 def read_instrument_profile(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Read positions and heights of a profile in an instrument's format. [um]"""
-    topography = _open(Path(path))
-    if topography.dim != 1:
+    topography, factor = _read(Path(path), None, None, None)
+    if topography.dim == 1:
+        x, z = topography.positions_and_heights()
+        return np.asarray(x) * factor, _filled(z) * factor
+    if topography.nb_grid_pts[1] != 1:
         problem = "expected a profile, got a map"
         raise DataFileError(path, problem, "Read it with read_height_map.")
-    factor = _factor(path, topography)
-    x, z = topography.positions_and_heights()
-    return np.asarray(x) * factor, np.ma.filled(np.ma.asarray(z, float), np.nan) * factor
+    z = _filled(topography.heights())[:, 0]
+    step = topography.physical_sizes[0] / z.size
+    return np.arange(z.size) * step * factor, z * factor
+
+
+def _filled(heights: Any) -> np.ndarray:
+    """Return heights with NaN for what the file marks as missing."""
+    filled = np.ma.filled(np.ma.asarray(heights, dtype=np.float64), np.nan)
+    # Some programs write the greatest number there is
+    return np.where(np.abs(filled) < _NO_HEIGHT, filled, np.nan)
+
+
+def _read(
+    path: Path,
+    spacing: float | tuple[float, float] | None,
+    unit: str | None,
+    channel: int | str | None,
+) -> tuple[Any, float]:
+    """Return the wanted channel of a file, and the size of its unit. [um]"""
+    reader = _open(path)
+    with _faults(path):
+        channels = [c for c in reader.channels if c.dim in (1, 2)]
+    chosen = choose_channel(path, channels, channel)
+    # The reader of another format may take a file for its own
+    if np.prod(chosen.nb_grid_pts, dtype=float) > 1000 * path.stat().st_size:
+        raise _unreadable(path, ValueError(f"{chosen.nb_grid_pts} points in a small file"))
+    factor = _factor(path, chosen.unit, unit)
+    sizes = None
+    if spacing is not None:
+        if chosen.physical_sizes is not None:
+            problem = "expected no spacing argument, the file names its own"
+            raise DataFileError(path, problem, "Leave the argument out.")
+        steps = np.broadcast_to(spacing, (chosen.dim,)) / factor
+        sizes = tuple(float(n * d) for n, d in zip(chosen.nb_grid_pts, steps, strict=True))
+    elif chosen.physical_sizes is None:
+        problem = "expected a grid spacing, the file names none"
+        raise DataFileError(path, problem, "Give spacing= in um.")
+    with _faults(path):
+        return reader.topography(channel_index=chosen.index, physical_sizes=sizes), factor
 
 
 def _open(path: Path) -> Any:
-    """Open the default channel of a file, which holds the heights."""
+    """Open a file; nothing but its header is read."""
     try:
         with warnings.catch_warnings():
             # It reports the absence of MPI, which nothing here needs
@@ -71,21 +138,49 @@ def _open(path: Path) -> Any:
         problem = f"expected a text, .npy or .x3p file, got {path.suffix or 'no extension'}"
         cure = "For instrument formats install the extra: pip install 'pbrdf[formats]'."
         raise DataFileError(path, problem, cure) from error
+    with _faults(path):
+        return SurfaceTopography.open_topography(plain_sur(path) or str(path))
+
+
+@contextmanager
+def _faults(path: Path) -> Iterator[None]:
+    """Turn whatever goes wrong in the package into a DataFileError."""
     try:
-        return SurfaceTopography.read_topography(str(path))
+        with warnings.catch_warnings():
+            # The hour of the measurement is of no concern
+            warnings.filterwarnings("ignore", message="tzname")
+            yield
+    except DataFileError:
+        raise
     # Forty parsers of damaged binary input fail in every way there is
     except Exception as error:
-        reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        problem = f"expected a height map in a known format, got: {reason}"
-        cure = "Check that the file is complete, or export text or x3p."
-        raise DataFileError(path, problem, cure) from error
+        raise _unreadable(path, error) from error
 
 
-def _factor(path: str | Path, topography: Any) -> float:
+def _unreadable(path: Path, error: Exception) -> DataFileError:
+    """Return what to tell of a file that the package does not read."""
+    if type(error).__name__ == "CannotDetectFileFormat":
+        reason = "a file that no reader recognises"
+    else:
+        text = " ".join(str(error).split()).rstrip(".")
+        reason = f"a fault on reading: {text[:200] or type(error).__name__}"
+    problem = f"expected a height map in a known format, got {reason}"
+    return DataFileError(
+        path, problem, "Check that the file is complete, or export text or x3p."
+    )
+
+
+def _factor(path: Path, found: Any, given: str | None) -> float:
     """Return the size of the file's unit, common to x, y and z. [um]"""
-    unit = topography.unit
-    if unit is None or normalise_unit(unit) not in LENGTH_UNITS:
-        problem = f"expected heights in a length unit, the file says {unit}"
-        cure = "Export the height channel, with its unit, as text or x3p."
-        raise DataFileError(path, problem, cure)
-    return LENGTH_UNITS[normalise_unit(unit)]
+    if found is None and given is not None:
+        return unit_factor(given)
+    if isinstance(found, str) and normalise_unit(found) in LENGTH_UNITS:
+        if given is None:
+            return LENGTH_UNITS[normalise_unit(found)]
+        problem = f"expected no unit argument, the file says {found}"
+        raise DataFileError(path, problem, "Leave the argument out.")
+    problem = f"expected heights in a length unit, the file says {found}"
+    cure = "Export the height channel, with its unit, as text or x3p."
+    if found is None:
+        problem, cure = "expected a length unit, the file names none", "Give unit=."
+    raise DataFileError(path, problem, cure)

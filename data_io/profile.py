@@ -1,6 +1,5 @@
 """Surface profiles z(x): the container and the reader of text files."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,20 +7,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from data_io._text import (
-    COMMENT_MARKS,
-    ZIP_MAGIC,
-    Line,
-    find_delimiter,
-    header_units,
-    read_bytes,
-    read_numbers,
-    split_header,
-    unit_factor,
-    warn_missing_unit,
-)
+from data_io._files import ZIP_MAGIC, read_bytes
+from data_io._text import column_names, find_delimiter, read_numbers, split_header
 from data_io._write import complete_file
 from data_io.instruments import INSTRUMENT_SUFFIXES, read_instrument_profile
+from data_io.profile_header import column_axes, find_columns, find_factors
 from data_io.x3p import read_x3p
 from pbrdf.errors import DataFileError, require
 
@@ -110,10 +100,11 @@ class Profile:
 def read_profile(path: str | Path, *, unit: str | tuple[str, str] | None = None) -> Profile:
     r"""Read a surface profile from a text file of two columns, or an instrument's own file.
 
-    Comma, semicolon, tab and space separate columns; lines that start with # or % are
-    comments. Units come from the header (``x_um,z_um`` or ``x [mm]  z [nm]``) or from the
-    caller. Columns headed x and z may stand in any order and among others. A scan written
-    from right to left is turned round.
+    Comma, semicolon, tab and space separate columns; decimals have a point, or a comma if
+    none separates columns; lines that start with # or % are comments. Units come from the
+    header (``x_um,z_um`` or ``x [mm]  z [nm]``) or from the caller. Columns headed x and z
+    may stand in any order and among others. A scan written from right to left is turned
+    round.
 
     Parameters
     ----------
@@ -147,21 +138,39 @@ def read_profile(path: str | Path, *, unit: str | tuple[str, str] | None = None)
     ...     read_profile(path)
     Profile(3 points, length 1 um, evenly spaced)
     """
-    if read_bytes(path)[:4] == ZIP_MAGIC:
+    suffix = Path(path).suffix.lower()
+    if read_bytes(path)[:4] == ZIP_MAGIC and suffix not in INSTRUMENT_SUFFIXES:
         return _read_x3p_profile(path)
-    if Path(path).suffix.lower() in INSTRUMENT_SUFFIXES:
+    if suffix in INSTRUMENT_SUFFIXES:
         x, z = read_instrument_profile(path)
         return build_profile(path, x[np.isfinite(z)], z[np.isfinite(z)])
     header, data = split_header(path)
-    names, column_x, column_z = _columns(path, header, data.first)
+    names, column_x, column_z = find_columns(path, header, data.first)
     block = read_numbers(path, data, names)
-    factor_x, factor_z = _factors(path, header, unit, names, column_x, column_z)
+    factor_x, factor_z = find_factors(path, header, unit, names, column_x, column_z)
     return build_profile(
         path,
         block[:, column_x] * factor_x,
         block[:, column_z] * factor_z,
         lines=data.numbers,
     )
+
+
+def holds_profile(path: str | Path) -> bool:
+    """Tell whether a text file is a profile, and not a height map, by its columns.
+
+    A profile has one or two columns, or columns headed x and z and none headed y.
+
+    Raises
+    ------
+    DataFileError
+        If the file is no text, or holds no numbers.
+    """
+    header, data = split_header(path)
+    if len(data.first.cells(find_delimiter(data.first))) <= 2:
+        return True
+    axes = column_axes(column_names(header, data.first))
+    return {"x", "z"} <= set(axes) and "y" not in axes
 
 
 def write_profile(profile: Profile, path: str | Path) -> None:
@@ -225,73 +234,3 @@ def build_profile(
         )
         raise DataFileError(path, problem, cure, line=place(i), column="x")
     return Profile(x[::-1], z[::-1]) if falling else Profile(x, z)
-
-
-def _columns(
-    path: str | Path, header: list[Line], first: Line
-) -> tuple[list[str] | None, int, int]:
-    """Return the column names, if the header has them, and which columns are x and z."""
-    delimiter = find_delimiter(first)
-    width = len(first.cells(delimiter))
-    names = None
-    if header:
-        text = header[-1].text.strip().lstrip("".join(COMMENT_MARKS)).strip()
-        candidate = Line(header[-1].number, text).cells(delimiter)
-        if len(candidate) == width:
-            names = candidate
-    # The axis is the first word of a name: "x_um", "Z [nm]", "x (mm)"
-    axes = [re.split(r"[_\s\[(]", name.lower(), maxsplit=1)[0] for name in names or []]
-    for axis in ("x", "z"):
-        if axes.count(axis) > 1:
-            problem = f"expected one column {axis}, found {axes.count(axis)}"
-            cure = "Remove or rename the others."
-            raise DataFileError(path, problem, cure, line=header[-1].number, column=axis)
-    if "x" in axes and "z" in axes:
-        return names, axes.index("x"), axes.index("z")
-    if width == 2:
-        return names, 0, 1
-    problem = f"expected two columns, x and z, got {width}"
-    cure = "Keep two columns or head them x and z; commas separate columns, not decimals."
-    raise DataFileError(path, problem, cure, line=first.number)
-
-
-def _factors(
-    path: str | Path,
-    header: list[Line],
-    unit: str | tuple[str, str] | None,
-    names: list[str] | None,
-    column_x: int,
-    column_z: int,
-) -> tuple[float, float]:
-    """Return the size of the units of x and z. [um]"""
-    given = None
-    if unit is not None:
-        pair = (unit, unit) if isinstance(unit, str) else unit
-        given = unit_factor(pair[0]), unit_factor(pair[1])
-    line, found = _named_units(header, names, column_x, column_z)
-    if found is None:
-        if given is None:
-            warn_missing_unit(path, stacklevel=4)
-            return 1.0, 1.0
-        return given
-    factors = unit_factor(found[0]), unit_factor(found[1])
-    if given is not None and given != factors:
-        problem = f"expected the unit given, {unit}, the header says {found[0]}, {found[1]}"
-        cure = "Leave the argument out or mend the header."
-        raise DataFileError(path, problem, cure, line=line)
-    return factors
-
-
-def _named_units(
-    header: list[Line], names: list[str] | None, column_x: int, column_z: int
-) -> tuple[int | None, tuple[str, str] | None]:
-    """Return the line that names units and the units of x and z, or None."""
-    if names is not None:
-        in_x, in_z = header_units(names[column_x]), header_units(names[column_z])
-        if in_x and in_z:
-            return header[-1].number, (in_x[0], in_z[0])
-    for line in reversed(header):
-        units = header_units(line.text)
-        if len(units) in (1, 2):
-            return line.number, (units[0], units[-1])
-    return None, None

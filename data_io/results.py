@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from data_io._text import read_bytes
+from data_io._files import read_bytes
 from data_io._write import complete_file
 from pbrdf.errors import DataFileError
 

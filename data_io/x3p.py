@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from data_io._files import NotAMapError
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
 
@@ -108,26 +109,30 @@ def read_x3p_map(path: str | Path) -> HeightMap:
     """Read an areal x3p file. [um]"""
     content = read_x3p(path)
     if min(content.rows.shape) < 2:
-        problem = f"expected a map, got a profile of {content.rows.size} points"
-        raise DataFileError(path, problem, "Read it with read_profile.")
+        raise NotAMapError(path, content.rows.size)
     return HeightMap(content.rows.T, content.steps)
 
 
 def _read_archive(path: Path, archive: zipfile.ZipFile) -> X3p:
-    names = [name for name in archive.namelist() if not name.startswith("__MACOSX")]
+    # Archives made on Windows may hold backslashes
+    names = {
+        name.replace("\\", "/"): name
+        for name in archive.namelist()
+        if not name.startswith("__MACOSX")
+    }
     mains = sorted((n for n in names if PurePosixPath(n).name == "main.xml"), key=len)
     if not mains:
         problem = "expected main.xml in the archive, found none"
         raise DataFileError(path, problem, "Only files after ISO 25178-72 can be read.")
     folder = PurePosixPath(mains[0]).parent
-    document = _Document(path, archive.read(mains[0]))
+    document = _Document(path, archive.read(names[mains[0]]))
 
     def member(link: str) -> bytes:
         name = str(folder / link.replace("\\", "/").lstrip("/"))
         if name not in names:
             problem = f"expected {name} in the archive, as main.xml says, found none"
             raise DataFileError(path, problem, "Export the file again.")
-        return archive.read(name)
+        return archive.read(names[name])
 
     shape = ("Record3", "MatrixDimension")
     nx, ny = (int(document.number(*shape, tag)) for tag in ("SizeX", "SizeY"))

@@ -10,6 +10,7 @@ import typer
 __all__ = [
     "Azimuths",
     "Blocked",
+    "Channel",
     "Fold",
     "Force",
     "FormOption",
@@ -83,6 +84,10 @@ Spacing = Annotated[
 Unit = Annotated[
     str | None,
     typer.Option(help="Length unit of a file that names none: nm, um, mm or m."),
+]
+Channel = Annotated[
+    str | None,
+    typer.Option(help="Channel of an instrument's file, by number or name."),
 ]
 FormOption = Annotated[
     str,

@@ -17,7 +17,6 @@ __all__ = ["read_scan", "read_surface"]
 
 _IMAGES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 _TEXT = {".csv", ".txt", ".asc", ".dat", ".tsv", ".xyz"}
-_MARKS = "#%;/"
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -28,6 +27,7 @@ def read_surface(
     um_per_pixel: float | None = None,
     spacing: float | None = None,
     unit: str | None = None,
+    channel: str | None = None,
     picture: Mapping[str, Any] = _NOTHING,
 ) -> "Profile | HeightMap":
     """Read a surface file as what it is, or as what the user says it is.
@@ -42,12 +42,14 @@ def read_surface(
     """
     import data_io
 
-    kind = _kind(path) if kind is Kind.auto else kind
+    guessed = kind is Kind.auto
+    kind = _kind(path) if guessed else kind
     given = {name: value for name, value in picture.items() if value is not None}
     unused = {
         "--um-per-pixel": um_per_pixel is not None and kind is not Kind.image,
         "--spacing-um": spacing is not None and kind is not Kind.map,
         "--unit": unit is not None and kind is Kind.image,
+        "--channel": channel is not None and kind is not Kind.map,
     } | {f"--{name.replace('_', '-')}": kind is not Kind.image for name in given}
     for option, wrong in unused.items():
         if wrong:
@@ -63,7 +65,12 @@ def read_surface(
         return data_io.read_profile_image(path, um_per_pixel, **given)
     if kind is Kind.profile:
         return data_io.read_profile(path, unit=unit)
-    return data_io.read_height_map(path, spacing=spacing, unit=unit)
+    try:
+        return data_io.read_height_map(path, spacing=spacing, unit=unit, channel=channel)
+    except data_io.NotAMapError:
+        if not guessed:
+            raise
+        return data_io.read_profile(path, unit=unit)
 
 
 def read_scan(path: Path, *, wavelength: float | None = None) -> "xr.Dataset":
@@ -96,23 +103,16 @@ def read_scan(path: Path, *, wavelength: float | None = None) -> "xr.Dataset":
 
 
 def _kind(path: Path) -> Kind:
-    """Tell the kind from the name; text with two columns is a profile, with more a map."""
+    """Tell the kind from the name, and that of a text file from its columns."""
     suffix = path.suffix.lower()
     if suffix in _IMAGES:
         return Kind.image
     if suffix not in _TEXT or suffix == ".xyz":
         return Kind.map
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for line in file:
-            words = line.replace(",", " ").replace(";", " ").split()
-            if words and words[0][0] not in _MARKS and _is_number(words[0]):
-                return Kind.profile if len(words) <= 2 else Kind.map
-    return Kind.profile
+    from data_io import holds_profile
 
-
-def _is_number(word: str) -> bool:
     try:
-        float(word)
+        return Kind.profile if holds_profile(path) else Kind.map
     except ValueError:
-        return False
-    return True
+        # Instruments write binary files of these names too; the reader says what is wrong
+        return Kind.map

@@ -31,6 +31,7 @@ def statistics(
     um_per_pixel: options.UmPerPixel = None,
     spacing: options.Spacing = None,
     unit: options.Unit = None,
+    channel: options.Channel = None,
     form: options.FormOption = "tilt",
     figure: Annotated[
         Path | None,
@@ -78,7 +79,7 @@ def statistics(
     }
     heights = read_surface(
         surface, kind=kind, um_per_pixel=um_per_pixel, spacing=spacing, unit=unit,
-        picture=picture,
+        channel=channel, picture=picture,
     )  # fmt: skip
     if overlay is not None:
         _draw_overlay(overlay, surface, heights, force=force)

@@ -1,6 +1,7 @@
 """The options of `pbrdf statistics` that belong to micrographs."""
 
 import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -66,3 +67,29 @@ def test_options_of_pictures_are_refused_with_profiles(tmp_path, capsys, options
     profile.write_text("x_um,z_um\n" + "".join(f"{x},{np.sin(x):.5f}\n" for x in range(60)))
     assert main(["statistics", str(profile), *options]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_an_x3p_or_comma_profile_is_known_without_being_told(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    z = np.convolve(rng.normal(size=640), np.hanning(31), "valid")
+    comma = tmp_path / "profile.txt"
+    rows = "".join(f"{0.5 * i}\t{h:.6f}\n".replace(".", ",") for i, h in enumerate(z))
+    comma.write_text("x [µm]\tz [µm]\n" + rows, encoding="utf-16")
+    line = tmp_path / "line.x3p"
+    axis = "<C{}><AxisType>I</AxisType><Increment>{}</Increment></C{}>"
+    data = "".join(f"<Datum>{h * 1e-6:.12f}</Datum>" for h in z)
+    with zipfile.ZipFile(line, "w") as archive:
+        archive.writestr(
+            "main.xml",
+            f"<a><Record1><Axes>{axis.format('X', 0.5e-6, 'X')}</Axes></Record1><Record3>"
+            f"<MatrixDimension><SizeX>{z.size}</SizeX><SizeY>1</SizeY></MatrixDimension>"
+            f"<DataList>{data}</DataList></Record3></a>",
+        )
+    assert height_of(comma) == pytest.approx(height_of(line), rel=1e-5)
+
+
+def test_a_channel_belongs_to_a_map(tmp_path, capsys):
+    profile = tmp_path / "profile.csv"
+    profile.write_text("x_um,z_um\n" + "".join(f"{x},{np.sin(x):.5f}\n" for x in range(60)))
+    assert main(["statistics", str(profile), "--channel", "Height"]) == 2
+    assert "--channel does not belong to a profile" in capsys.readouterr().err
