@@ -225,8 +225,8 @@ def observe(  # noqa: PLR0913  (the public signature)
 
     seen = Readings(look)
     gather(
-        draw, root, seen.add, seen.rel_error, samples=samples, target=target,
-        workers=arguments.worker_count(workers), progress=progress,
+        draw, root, lambda sight, _: seen.add(sight), seen.rel_error, samples=samples,
+        target=target, workers=arguments.worker_count(workers), progress=progress,
     )  # fmt: skip
     for note in (late := lost_ray_warnings(int(seen.counts[N_LEAKED]), seen.bundles)):
         warnings.warn(note, AccuracyWarning, stacklevel=2)

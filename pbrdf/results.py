@@ -23,7 +23,7 @@ from pbrdf.kernels.shading import (
 )
 from pbrdf.scene import Scene
 from pbrdf.surface import HeightMap
-from pbrdf.tracer.plan import Moments
+from pbrdf.tracer.moments import Moments
 
 
 def to_dataset(

@@ -4,6 +4,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,8 @@ from pbrdf.scene import Contamination, Scene, Surface
 from pbrdf.surface import HeightMap
 from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
-from pbrdf.tracer.plan import Moments, Plan, Tally
+from pbrdf.tracer.moments import Moments
+from pbrdf.tracer.plan import Plan, Tally
 from pbrdf.tracer.schedule import gather
 from pbrdf.tracer.skips import chosen_skips, explanation
 from pbrdf.tracer.trace import prepare, trace_sample
@@ -190,9 +192,9 @@ def simulate(  # noqa: PLR0913  (the public signature)
 
     moments = [Moments(one) for one in plans]
 
-    def add(tallies: Sequence[Tally]) -> None:
+    def add(tallies: Sequence[Tally], run: Callable[..., Iterable[Any]]) -> None:
         for one, tally in zip(moments, tallies, strict=True):
-            one.add(tally)
+            one.add(tally, run)
             spare.append(tally.emptied())
 
     done = gather(

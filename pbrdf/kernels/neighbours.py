@@ -6,6 +6,7 @@ certain. Its neighbours tell how often such paths come.
 """
 
 import math
+from collections import namedtuple
 
 from pbrdf.kernels import jit
 
@@ -17,36 +18,41 @@ TINY = 1e-300
 # Sums beside those of the elements' noise: light, its square by area, and area
 LIGHT, SQUARE, AREA, N_BESIDE = 0, 1, 2, 3
 
+# To work in: sums (n_theta, n_dphi, elements + N_BESIDE), the same memory flat (n_theta,
+# n_dphi (elements + N_BESIDE)), rows as flat, and unseen (elements,)
+Room = namedtuple("Room", "sums flat rows unseen")
+
 
 @jit(forceinline=True)
-def sum_around(values, rows):
+def sum_around(values, rows, n_columns):
     """Sum over each bin and its neighbours, round the azimuth but not over the pole.
 
-    values      by bin (n_theta, n_dphi, columns), replaced by the sums
+    values      by bin (n_theta, n_dphi n_columns), replaced by the sums
     rows        room of the same shape
     """
-    n_theta, n_dphi, n_columns = values.shape
-    reach = min(REACH, (n_dphi - 1) // 2)
+    n_theta, width = values.shape
+    reach = min(REACH, (width // n_columns - 1) // 2)
     for i in range(n_theta):
-        for j in range(n_dphi):
-            for c in range(n_columns):
-                rows[i, j, c] = 0.0
-            for step in range(-reach, reach + 1):
-                other = (j + step) % n_dphi
-                for c in range(n_columns):
-                    rows[i, j, c] += values[i, other, c]
+        for x in range(width):
+            rows[i, x] = values[i, x]
+        # One long loop for each neighbour: the compiler makes vector code of it
+        for step in range(1, reach + 1):
+            for shift in (step * n_columns, width - step * n_columns):
+                for x in range(width - shift):
+                    rows[i, x] += values[i, x + shift]
+                for x in range(width - shift, width):
+                    rows[i, x] += values[i, x + shift - width]
     for i in range(n_theta):
-        low, high = max(i - REACH, 0), min(i + REACH + 1, n_theta)
-        for j in range(n_dphi):
-            for c in range(n_columns):
-                values[i, j, c] = 0.0
-            for other in range(low, high):
-                for c in range(n_columns):
-                    values[i, j, c] += rows[other, j, c]
+        for x in range(width):
+            values[i, x] = rows[i, x]
+        for other in range(max(i - REACH, 0), min(i + REACH + 1, n_theta)):
+            if other != i:
+                for x in range(width):
+                    values[i, x] += rows[other, x]
 
 
 @jit(allocates=False)
-def share_noise(mean, variance, weight, one, sums, rows, unseen):
+def share_noise(mean, variance, weight, one, room):
     """Take the variances of the flux of a bin and of like neighbours together.
 
     With V the mean variance around a bin and S² the scatter of the means there, noise
@@ -64,15 +70,16 @@ def share_noise(mean, variance, weight, one, sums, rows, unseen):
     weight          projected solid angle of the bins (n_theta, n_dphi) [sr], to which the
                     variance of few paths is proportional
     one             flux of one path of mean strength
-    sums, rows      room (n_theta, n_dphi, elements + N_BESIDE)
-    unseen          room (elements,)
+    room            `Room`
     """
     n_theta, n_dphi, n_elements = mean.shape
+    sums, unseen = room.sums, room.unseen
     for i in range(n_theta):
         for j in range(n_dphi):
             area, light = weight[i, j], mean[i, j, 0]
+            per_area = 1.0 / area if light != 0.0 else 0.0
             for e in range(n_elements):
-                sums[i, j, e] = variance[i, j, e] / area if light != 0.0 else 0.0
+                sums[i, j, e] = variance[i, j, e] * per_area
             sums[i, j, n_elements + LIGHT] = light
             sums[i, j, n_elements + SQUARE] = light * light / area
             sums[i, j, n_elements + AREA] = area
@@ -87,7 +94,7 @@ def share_noise(mean, variance, weight, one, sums, rows, unseen):
     for e in range(n_elements):
         unseen[e] *= per_path
 
-    sum_around(sums, rows)
+    sum_around(room.flat, room.rows, sums.shape[2])
     columns = 2 * min(REACH, (n_dphi - 1) // 2) + 1
     for i in range(n_theta):
         number = columns * (min(i + REACH + 1, n_theta) - max(i - REACH, 0))
@@ -101,9 +108,11 @@ def share_noise(mean, variance, weight, one, sums, rows, unseen):
             scatter = max(sums[i, j, n_elements + SQUARE] - light, 0.0) / max(number - 1, 1)
             paths = light / number / noise
             share = MANY / (MANY + paths) * noise / max(scatter, noise)
+            rest, around, missed = 1.0 - share, share * area / number, share / number
             for e in range(n_elements):
-                around = (sums[i, j, e] + unseen[e] / area) / number
-                variance[i, j, e] += share * (around * area - variance[i, j, e])
+                variance[i, j, e] = (
+                    rest * variance[i, j, e] + around * sums[i, j, e] + missed * unseen[e]
+                )
 
 
 @jit(allocates=False)
@@ -116,7 +125,7 @@ def estimate(mean, scatter, samples, one, weight, plane, room):
 
     mean, scatter   flux and its squares summed about it (n_theta, n_dphi, elements)
     plane           elements that vanish in the plane of incidence (elements,)
-    room            (sums, rows, unseen) of `share_noise`
+    room            `Room`
     """
     n_theta, n_dphi, n_elements = mean.shape
     if samples < 2:
@@ -128,7 +137,7 @@ def estimate(mean, scatter, samples, one, weight, plane, room):
                 lit = mean[i, j, 0] != 0.0
                 for e in range(n_elements):
                     scatter[i, j, e] = scatter[i, j, e] * per_sample if lit else one * one
-        share_noise(mean, scatter, weight, one, room[0], room[1], room[2])
+        share_noise(mean, scatter, weight, one, room)
     for i in range(n_theta):
         for j in range(n_dphi):
             per_weight = 1.0 / weight[i, j]

@@ -19,8 +19,9 @@ from pbrdf.kernels.volume import internal_reflectance
 # nothing is diffuse; n_stokes is 4 for (I, Q, U, V), 3 without V, 1 for I alone
 Optics = namedtuple("Optics", "n kappa base n_stokes")
 # The tally: `bin_edges`; flux by bin (wavelengths, bounces, n_theta, n_dphi, stokes,
-# stokes); energy (wavelengths, N_ENERGIES); counts (N_COUNTS,); room for one matrix (4, 4)
-Tally = namedtuple("Tally", "zenith azimuth flux energy counts mueller")
+# stokes); lit, whether a path came there (bounces, n_theta, n_dphi); energy (wavelengths,
+# N_ENERGIES); counts (N_COUNTS,); room for one matrix (4, 4)
+Tally = namedtuple("Tally", "zenith azimuth flux lit energy counts mueller")
 
 # Columns of a record
 TURN_C, TURN_S, COS_IN, COS_OUT, LABEL, N_RECORD = 0, 1, 2, 3, 4, 5
@@ -263,6 +264,7 @@ def tally_path(
     )
     order = min(bounces, flux.shape[1]) - 1
     tally.counts[N_ORDERS + order] += 1
+    tally.lit[order, i_theta, i_dphi] = True
     for w in range(energy.shape[0]):
         path_mueller(record, ray, bounces, w, optics, n_stokes, mueller)
         energy[w, ABSORBED] -= mueller[0, 0]

@@ -9,8 +9,9 @@ them with the polynomials that go through its A, B, C and D at the Chebyshev poi
 bin. `pbrdf.kernels.bin_fits` finds how many powers each bin needs; a bin for which its
 MAX_ORDER do not suffice gets none, and its paths are shaded one by one.
 
-Paths of several bounces wait in a buffer and are shaded together, wavelength by wavelength,
-so that the tally of one stays in the cache.
+Paths of several bounces wait in a buffer. When a sample has been traced its light is shaded
+and added to the moments wavelength by wavelength, so that one tally, of one wavelength and
+in the cache, serves all. A buffer that overflows is shaded into a tally of all of them.
 """
 
 from collections import namedtuple
@@ -18,6 +19,7 @@ from collections import namedtuple
 from pbrdf.kernels import jit
 from pbrdf.kernels.binning import bin_of_direction
 from pbrdf.kernels.fresnel_table import table_elements
+from pbrdf.kernels.moments import add_wavelength, fold_wavelength
 from pbrdf.kernels.shading import (
     ABSORBED,
     COS_IN,
@@ -42,15 +44,20 @@ from pbrdf.kernels.shading import (
 N_SUMS = 9  # 1, c_in, s_in, c_out, s_out, and the four products of an in and an out
 # Columns of a bin: first of its sums, powers kept, middle and inverse half range of x
 BIN_START, BIN_ORDER, BIN_MID, BIN_SCALE, N_BIN = 0, 1, 2, 3, 4
+# To shade in: flux (1 or wavelengths, bounces, n_theta, n_dphi, stokes, stokes), empty but
+# for what has overflowed, and the same memory `by_bin` as `pbrdf.kernels.moments` takes
+# it; a matrix (4, 4), its elements (stokes ** 2,) and elements at points (4, MAX_ORDER)
+Room = namedtuple("Room", "flux by_bin mueller matrix factors")
 # First row of a path in the buffer, before its records: fate, bounces, bin
 P_END, P_BOUNCES, P_THETA, P_DPHI = 0, 1, 2, 3
 
 # bins (n_theta, n_dphi, N_BIN); sums (materials, size), of no size where every path is
-# shaded at once; paths, a buffer, and fill (1,), how much of it is in use; the
-# `FresnelTable`; points and powers: Chebyshev points (MAX_ORDER + 1, MAX_ORDER) and the
-# matrices from values there to the factors of the powers; room for elements at the
-# points
-Spectra = namedtuple("Spectra", "bins sums paths fill table points powers factors")
+# shaded at once; paths, a buffer; state (2,): how much of it is in use, and whether it has
+# overflowed into the tally; the `FresnelTable`; points and powers: Chebyshev points
+# (MAX_ORDER + 1, MAX_ORDER) and the matrices from values there to the factors of the
+# powers; room for elements at the points
+Spectra = namedtuple("Spectra", "bins sums paths state table points powers factors")
+FILL, OVERFLOWED = 0, 1
 
 
 @jit(forceinline=True)
@@ -94,10 +101,10 @@ def add_bounce(record, ray, i_theta, i_dphi, n_stokes, spectra):
 @jit(forceinline=True)
 def keep_path(end, record, ray, bounces, i_theta, i_dphi, spectra, optics, tally):
     """Put a path into the buffer; make room first if it is full."""
-    paths, fill = spectra.paths, spectra.fill
-    if fill[0] + bounces + 2 > paths.shape[0]:
-        shade_paths(spectra, optics, tally)
-    row = fill[0]
+    paths, state = spectra.paths, spectra.state
+    if state[FILL] + bounces + 2 > paths.shape[0]:
+        empty_buffer(spectra, optics, tally)
+    row = state[FILL]
     paths[row, 0, P_END] = end
     paths[row, 0, P_BOUNCES] = bounces
     paths[row, 0, P_THETA] = i_theta
@@ -106,7 +113,7 @@ def keep_path(end, record, ray, bounces, i_theta, i_dphi, spectra, optics, tally
         row += 1
         for column in range(N_RECORD):
             paths[row, 0, column] = record[bounce, ray, column]
-    fill[0] = row + 1
+    state[FILL] = row + 1
 
 
 @jit(forceinline=True)
@@ -122,7 +129,9 @@ def gather_path(
     i_theta, i_dphi = bin_of_direction(
         k_x, k_y, k_z, cos_phi_i, sin_phi_i, tally.zenith, tally.azimuth
     )
-    tally.counts[N_ORDERS + min(bounces, tally.flux.shape[1]) - 1] += 1
+    order = min(bounces, tally.flux.shape[1]) - 1
+    tally.counts[N_ORDERS + order] += 1
+    tally.lit[order, i_theta, i_dphi] = True
     once = bounces == 1 and record[0, ray, COS_OUT] == SPECULAR
     if once and spectra.bins[i_theta, i_dphi, BIN_ORDER] > 0.0:
         add_bounce(record, ray, i_theta, i_dphi, optics.n_stokes, spectra)
@@ -167,29 +176,37 @@ def mirror_path(paths, row, bounces, w, table, n_stokes, mueller):
     return True
 
 
-@jit(allocates=False)
-def shade_paths(spectra, optics, tally):
-    """Shade the paths of the buffer, wavelength by wavelength, and empty it."""
+@jit(forceinline=True)
+def shade_paths(w, spectra, optics, flux, slot, energy, mueller):
+    """Shade the paths of the buffer for wavelength w, which is `slot` of the flux."""
     paths, table = spectra.paths, spectra.table
-    flux, energy, mueller = tally.flux, tally.energy, tally.mueller
-    for w in range(energy.shape[0]):
-        row = 0
-        while row < spectra.fill[0]:
-            end = int(paths[row, 0, P_END])
-            bounces = int(paths[row, 0, P_BOUNCES])
-            n_stokes = optics.n_stokes if end == N_ESCAPED else 1
-            if not mirror_path(paths, row + 1, bounces, w, table, n_stokes, mueller):
-                reflect_often(paths[row + 1 :], 0, bounces, w, optics, n_stokes, mueller)
-            energy[w, ABSORBED] -= mueller[0, 0]
-            if end != N_ESCAPED:
-                energy[w, lost_energy(end)] += mueller[0, 0]
-            else:
-                i_theta = int(paths[row, 0, P_THETA])
-                i_dphi = int(paths[row, 0, P_DPHI])
-                order = min(bounces, flux.shape[1]) - 1
-                add_light(mueller, n_stokes, flux, w, order, i_theta, i_dphi)
-            row += bounces + 2
-    spectra.fill[0] = 0
+    row = 0
+    while row < spectra.state[FILL]:
+        end = int(paths[row, 0, P_END])
+        bounces = int(paths[row, 0, P_BOUNCES])
+        n_stokes = optics.n_stokes if end == N_ESCAPED else 1
+        if not mirror_path(paths, row + 1, bounces, w, table, n_stokes, mueller):
+            reflect_often(paths[row + 1 :], 0, bounces, w, optics, n_stokes, mueller)
+        energy[w, ABSORBED] -= mueller[0, 0]
+        if end != N_ESCAPED:
+            energy[w, lost_energy(end)] += mueller[0, 0]
+        else:
+            i_theta = int(paths[row, 0, P_THETA])
+            i_dphi = int(paths[row, 0, P_DPHI])
+            order = min(bounces, flux.shape[1]) - 1
+            add_light(mueller, n_stokes, flux, slot, order, i_theta, i_dphi)
+        row += bounces + 2
+
+
+@jit(allocates=False)
+def empty_buffer(spectra, optics, tally):
+    """Shade the paths of the buffer into the tally of all wavelengths."""
+    if not spectra.state[OVERFLOWED]:
+        tally.flux[:] = 0.0
+        spectra.state[OVERFLOWED] = 1
+    for w in range(tally.energy.shape[0]):
+        shade_paths(w, spectra, optics, tally.flux, w, tally.energy, tally.mueller)
+    spectra.state[FILL] = 0
 
 
 @jit(forceinline=True)
@@ -207,13 +224,20 @@ def sums_at_points(sums, m, at, order, n_sums, powers, room):
             sums[m, at + p * n_sums + q] = room[0, p]
 
 
-@jit(forceinline=True)
-def is_lit(sums, m, at, order, n_sums):
-    """Whether a path reached a bin: the weights of its points add up to their number."""
-    paths = 0.0
-    for p in range(order):
-        paths += sums[m, at + p * n_sums]
-    return paths > 0.5
+@jit(allocates=False)
+def close_sums(spectra, n_stokes, lit):
+    """Make the sums of a whole sample ready for shading."""
+    bins, sums = spectra.bins, spectra.sums
+    n_sums = 1 if n_stokes == 1 else N_SUMS
+    for m in range(sums.shape[0]):
+        for i in range(bins.shape[0]):
+            for j in range(bins.shape[1]):
+                order = int(bins[i, j, BIN_ORDER])
+                if order > 0 and lit[0, i, j]:
+                    sums_at_points(
+                        sums, m, int(bins[i, j, BIN_START]), order, n_sums,
+                        spectra.powers, spectra.factors,
+                    )  # fmt: skip
 
 
 @jit(forceinline=True)
@@ -227,18 +251,17 @@ def elements_at_points(mid, half, order, w, m, table, points, elements):
 
 
 @jit(forceinline=True)
-def shade_bin(w, m, i_theta, i_dphi, spectra, n_stokes, tally):
-    """Add the light that one bounce on one material sends into a bin."""
-    bins, sums, factors, flux = spectra.bins, spectra.sums, spectra.factors, tally.flux
+def shade_bin(slot, m, i_theta, i_dphi, spectra, factors, n_stokes, flux):
+    """Add the light that one bounce on one material sends into a bin; return its M00."""
+    bins, sums = spectra.bins, spectra.sums
     at = int(bins[i_theta, i_dphi, BIN_START])
     order = int(bins[i_theta, i_dphi, BIN_ORDER])
     m00 = 0.0
     if n_stokes == 1:
         for k in range(order):
             m00 += factors[0, k] * sums[m, at + k]
-        flux[w, 0, i_theta, i_dphi, 0, 0] += m00
-        tally.energy[w, ABSORBED] -= m00
-        return
+        flux[slot, 0, i_theta, i_dphi, 0, 0] += m00
+        return m00
     m01 = m02 = m10 = m11 = m12 = m20 = m21 = m22 = 0.0
     m13 = m23 = m31 = m32 = m33 = 0.0
     for k in range(order):
@@ -264,70 +287,64 @@ def shade_bin(w, m, i_theta, i_dphi, spectra, n_stokes, tally):
         m32 += d * c_in
         m33 += c * one
         at += N_SUMS
-    flux[w, 0, i_theta, i_dphi, 0, 0] += m00
-    flux[w, 0, i_theta, i_dphi, 0, 1] += m01
-    flux[w, 0, i_theta, i_dphi, 0, 2] += m02
-    flux[w, 0, i_theta, i_dphi, 1, 0] += m10
-    flux[w, 0, i_theta, i_dphi, 1, 1] += m11
-    flux[w, 0, i_theta, i_dphi, 1, 2] += m12
-    flux[w, 0, i_theta, i_dphi, 2, 0] += m20
-    flux[w, 0, i_theta, i_dphi, 2, 1] += m21
-    flux[w, 0, i_theta, i_dphi, 2, 2] += m22
+    flux[slot, 0, i_theta, i_dphi, 0, 0] += m00
+    flux[slot, 0, i_theta, i_dphi, 0, 1] += m01
+    flux[slot, 0, i_theta, i_dphi, 0, 2] += m02
+    flux[slot, 0, i_theta, i_dphi, 1, 0] += m10
+    flux[slot, 0, i_theta, i_dphi, 1, 1] += m11
+    flux[slot, 0, i_theta, i_dphi, 1, 2] += m12
+    flux[slot, 0, i_theta, i_dphi, 2, 0] += m20
+    flux[slot, 0, i_theta, i_dphi, 2, 1] += m21
+    flux[slot, 0, i_theta, i_dphi, 2, 2] += m22
     if n_stokes == 4:
-        flux[w, 0, i_theta, i_dphi, 1, 3] += m13
-        flux[w, 0, i_theta, i_dphi, 2, 3] += m23
-        flux[w, 0, i_theta, i_dphi, 3, 1] += m31
-        flux[w, 0, i_theta, i_dphi, 3, 2] += m32
-        flux[w, 0, i_theta, i_dphi, 3, 3] += m33
-    tally.energy[w, ABSORBED] -= m00
+        flux[slot, 0, i_theta, i_dphi, 1, 3] += m13
+        flux[slot, 0, i_theta, i_dphi, 2, 3] += m23
+        flux[slot, 0, i_theta, i_dphi, 3, 1] += m31
+        flux[slot, 0, i_theta, i_dphi, 3, 2] += m32
+        flux[slot, 0, i_theta, i_dphi, 3, 3] += m33
+    return m00
 
 
-@jit(allocates=False)
-def shade_sums(spectra, optics, tally):
-    """Shade what one bounce sent into each bin, for all wavelengths."""
-    bins, sums = spectra.bins, spectra.sums
+@jit(forceinline=True)
+def shade_sums(w, spectra, n_stokes, lit, flux, slot, factors):
+    """Add the light that one bounce sent into each bin at wavelength w; return its M00."""
+    bins = spectra.bins
     n_theta, n_dphi = bins.shape[:2]
-    n_sums = 1 if optics.n_stokes == 1 else N_SUMS
-    for m in range(sums.shape[0]):
+    m00 = 0.0
+    for m in range(spectra.sums.shape[0]):
         for i in range(n_theta):
-            for j in range(n_dphi):
-                at = int(bins[i, j, BIN_START])
-                order = int(bins[i, j, BIN_ORDER])
-                if order > 0 and sums[m, at] > 0.0:
-                    sums_at_points(
-                        sums, m, at, order, n_sums, spectra.powers, spectra.factors
-                    )
-    for w in range(tally.energy.shape[0]):
-        for m in range(sums.shape[0]):
-            for i in range(n_theta):
-                for j in range(n_dphi // 2 + 1):
-                    # The bin on the other side of the plane of incidence has the same x
-                    other = (n_dphi - j) % n_dphi
-                    order = int(bins[i, j, BIN_ORDER])
-                    here = is_lit(sums, m, int(bins[i, j, BIN_START]), order, n_sums)
-                    there = is_lit(sums, m, int(bins[i, other, BIN_START]), order, n_sums)
-                    if here or there:
-                        elements_at_points(
-                            bins[i, j, BIN_MID], 1.0 / bins[i, j, BIN_SCALE],
-                            order, w, m, spectra.table, spectra.points,
-                            spectra.factors,
-                        )  # fmt: skip
-                    if here:
-                        shade_bin(w, m, i, j, spectra, optics.n_stokes, tally)
-                    if there and other != j:
-                        shade_bin(w, m, i, other, spectra, optics.n_stokes, tally)
+            for j in range(n_dphi // 2 + 1):
+                # The bin on the other side of the plane of incidence has the same x
+                other = (n_dphi - j) % n_dphi
+                if not (lit[0, i, j] or lit[0, i, other]):
+                    continue
+                elements_at_points(
+                    bins[i, j, BIN_MID], 1.0 / bins[i, j, BIN_SCALE],
+                    int(bins[i, j, BIN_ORDER]), w, m, spectra.table, spectra.points,
+                    factors,
+                )  # fmt: skip
+                if lit[0, i, j]:
+                    m00 += shade_bin(slot, m, i, j, spectra, factors, n_stokes, flux)
+                if lit[0, i, other] and other != j:
+                    m00 += shade_bin(slot, m, i, other, spectra, factors, n_stokes, flux)
+    return m00
 
 
 @jit(allocates=False)
-def shade_gathered(n_rays, spectra, optics, tally):
-    """Shade all that was gathered of `n_rays` rays, and clear the sums.
+def add_spectrum(first, last, n_units, spectra, optics, fold, lit, energy, room, running):
+    """Shade a sample at wavelengths [first, last) and add it to their running moments.
 
-    Each ray brings one unit of unpolarised light to every wavelength; without a diffuse
-    base one that left sideways takes it back.
+    n_units         rays that brought one unit of unpolarised light to every wavelength
+    lit             whether paths of the sample came to a bin (bounces, n_theta, n_dphi)
+    energy          of the sample (wavelengths, N_ENERGIES), completed
+    room            `Room`
+    running         `pbrdf.kernels.moments.Running`
     """
-    shade_paths(spectra, optics, tally)
-    shade_sums(spectra, optics, tally)
-    spectra.sums[:] = 0.0
-    aside = tally.counts[N_SIDE] if optics.base.shape[1] == 0 else 0
-    for w in range(tally.energy.shape[0]):
-        tally.energy[w, ABSORBED] += n_rays - aside
+    for w in range(first, last):
+        slot = w if spectra.state[OVERFLOWED] else 0
+        shade_paths(w, spectra, optics, room.flux, slot, energy, room.mueller)
+        single = shade_sums(w, spectra, optics.n_stokes, lit, room.flux, slot, room.factors)
+        energy[w, ABSORBED] += n_units - single
+        if fold:
+            fold_wavelength(room.flux, slot, lit)
+        add_wavelength(room.by_bin, slot, w, room.matrix, running)

@@ -79,6 +79,7 @@ def deposit(state, top, columns, w, cos_phi_i, sin_phi_i, tally):
     order = int(min(state[top, EVENTS], tally.flux.shape[1])) - 1
     tally.counts[N_ESCAPED] += 1
     tally.counts[N_ORDERS + order] += 1
+    tally.lit[order, i_theta, i_dphi] = True
     for row in range(columns):
         for column in range(columns):
             tally.flux[w, order, i_theta, i_dphi, row, column] += state[

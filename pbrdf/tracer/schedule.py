@@ -1,9 +1,10 @@
 """Samples computed by threads and taken in their order, until there are enough."""
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TypeVar
+from contextlib import closing
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -15,7 +16,7 @@ MOST_SAMPLES = 4096
 def gather(
     draw: Callable[[np.random.SeedSequence], T],
     root: np.random.SeedSequence,
-    add: Callable[[T], None],
+    add: Callable[[T, Callable[..., Iterable[Any]]], None],
     rel_error: Callable[[], float],
     *,
     samples: int,
@@ -25,17 +26,22 @@ def gather(
 ) -> int:
     """Draw samples and add them; with a target until the relative error falls to it.
 
+    `add` gets a sample and the `map` of the threads, for work of its own.
     Returns their number: `samples`, or from so many on the first that meets the target.
     The order of samples, and so the result, is the same for any number of workers.
     """
     limit = samples if target is None else max(samples, MOST_SAMPLES)
-    for done, sample in enumerate(in_order(draw, root, limit, workers), start=1):
-        add(sample)
-        if progress is not None:
-            progress(done, limit)
-        # One sample alone has no error
-        if target is not None and done >= max(samples, 2) and rel_error() <= target:
-            return done
+    with (
+        ThreadPoolExecutor(workers) as pool,
+        closing(in_order(draw, root, limit, pool, 2 * workers)) as drawn,
+    ):
+        for done, sample in enumerate(drawn, start=1):
+            add(sample, pool.map)
+            if progress is not None:
+                progress(done, limit)
+            # One sample alone has no error
+            if target is not None and done >= max(samples, 2) and rel_error() <= target:
+                return done
     return limit
 
 
@@ -43,18 +49,18 @@ def in_order(
     draw: Callable[[np.random.SeedSequence], T],
     root: np.random.SeedSequence,
     samples: int,
-    workers: int,
-) -> Iterator[T]:
-    """Draw samples from spawned seeds by threads, a few ahead, in their order."""
-    with ThreadPoolExecutor(workers) as pool:
-        pending: deque[Future[T]] = deque()
-        submitted = 0
-        try:
-            while submitted < samples or pending:
-                while submitted < samples and len(pending) < 2 * workers:
-                    pending.append(pool.submit(draw, root.spawn(1)[0]))
-                    submitted += 1
-                yield pending.popleft().result()
-        finally:
-            for future in pending:
-                future.cancel()
+    pool: ThreadPoolExecutor,
+    ahead: int,
+) -> Generator[T, None, None]:
+    """Draw samples from spawned seeds by threads, some ahead, in their order."""
+    pending: deque[Future[T]] = deque()
+    submitted = 0
+    try:
+        while submitted < samples or pending:
+            while submitted < samples and len(pending) < ahead:
+                pending.append(pool.submit(draw, root.spawn(1)[0]))
+                submitted += 1
+            yield pending.popleft().result()
+    finally:
+        for future in pending:
+            future.cancel()

@@ -11,8 +11,8 @@ from pbrdf.kernels.shading import N_RECORD
 
 # From this many wavelengths on, sums by bin cost less than every path shaded for each
 WORTHWHILE = 4
-# Rows of the buffer of paths with several bounces: it stays in the cache of a core
-BUFFER = 65536
+# Rows of the buffer of paths with several bounces, 10 MB: for half a million rays or so
+BUFFER = 2**18
 
 
 def chebyshev_points() -> tuple[np.ndarray, np.ndarray]:
@@ -30,7 +30,7 @@ def chebyshev_points() -> tuple[np.ndarray, np.ndarray]:
 POINTS, POWERS = chebyshev_points()
 NOTHING = kernel.Spectra(
     np.empty((0, 0, kernel.N_BIN)), np.empty((0, 0)), np.empty((0, 1, N_RECORD)),
-    np.zeros(1, dtype=np.int64),
+    np.zeros(2, dtype=np.int64),
     FresnelTable(
         np.empty((0, 0, 0, 0)), np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0))
     ),
@@ -88,11 +88,11 @@ class Spectrum:
         return cls(table=table, bins=tuple(bins), sizes=tuple(sizes))
 
     def room(self, index: int, max_bounces: int) -> kernel.Spectra:
-        """Empty sums and buffer for incident direction `index` of one sample."""
+        """Empty sums and buffer for incident direction `index` of samples."""
         return kernel.Spectra(
             self.bins[index],
             np.zeros((self.table.n.shape[1], self.sizes[index])),
             np.empty((max(BUFFER, max_bounces + 2), 1, N_RECORD)),
-            np.zeros(1, dtype=np.int64),
+            np.zeros(2, dtype=np.int64),
             self.table, POINTS, POWERS, np.empty((4, MAX_ORDER)),
         )  # fmt: skip

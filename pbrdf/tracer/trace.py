@@ -10,7 +10,7 @@ from pbrdf.kernels.binning import bin_edges
 from pbrdf.kernels.entry import Source
 from pbrdf.kernels.events import N_HIT
 from pbrdf.kernels.horizon import NO_HORIZON
-from pbrdf.kernels.spectra import shade_gathered
+from pbrdf.kernels.spectra import close_sums
 from pbrdf.kernels.sweep import N_FIRST
 from pbrdf.kernels.transparent import trace_among_bodies
 from pbrdf.kernels.transport import N_WAITING, sweep_batch, trace_batch
@@ -50,7 +50,6 @@ def trace_sample(
     if isinstance(target, WetField):
         tally = replace(tally, reports=target.reports, notes=target.notes)
     zenith, azimuth = bin_edges(plan.n_theta, plan.n_dphi)
-    optics = shading.Optics(plan.n, plan.kappa, plan.base, plan.n_stokes)
     record = np.empty((plan.max_bounces + 1, 1, shading.N_RECORD))
     waiting = np.empty((plan.max_bounces, N_WAITING))
     rng = np.random.default_rng(seed)
@@ -68,8 +67,8 @@ def trace_sample(
             shifts[index], streams[index], np.sin(plan.half_angle),
         )  # fmt: skip
         bins = shading.Tally(
-            zenith, azimuth, tally.flux[index], tally.energy[index], tally.counts[index],
-            np.zeros((4, 4)),
+            zenith, azimuth, tally.flux[index], tally.lit[index], tally.energy[index],
+            tally.counts[index], np.zeros((4, 4)),
         )  # fmt: skip
         # One pass along each line of entry points finds all first facets
         walks = not isinstance(target, EmbreeField)
@@ -85,15 +84,16 @@ def trace_sample(
                 plan.n_stokes, places, bins,
             )  # fmt: skip
             continue
-        shared = plan.spectrum
-        light = shared.room(index, plan.max_bounces) if shared else NOTHING
+        light = tally.spectra[index] if tally.spectra else NOTHING
         if sweeps:
             sweep_batch(
-                field.terrain, source, meetings, record, waiting, light, optics, bins
+                field.terrain, source, meetings, record, waiting, light, plan.optics, bins
             )
         else:
             tree = None if isinstance(target, Field) else target.tree()
-            trace_batch(field.terrain, tree, source, record, waiting, light, optics, bins)
-        if shared:
-            shade_gathered(plan.n_rays, light, optics, bins)
+            trace_batch(
+                field.terrain, tree, source, record, waiting, light, plan.optics, bins
+            )
+        if tally.spectra:
+            close_sums(light, plan.n_stokes, bins.lit)
     return tally

@@ -70,7 +70,10 @@ def segments_of(wet, theta, n_rays):
     zenith, azimuth = bin_edges(45, 90)
     flux = np.zeros((1, 3, 45, 90, 4, 4))
     counts = np.zeros(shading.N_COUNTS, dtype=np.int64)
-    tally = shading.Tally(zenith, azimuth, flux, np.zeros((1, 4)), counts, np.zeros((4, 4)))
+    lit = np.zeros(flux.shape[1:4], dtype=bool)
+    tally = shading.Tally(
+        zenith, azimuth, flux, lit, np.zeros((1, 4)), counts, np.zeros((4, 4))
+    )
     launch = wet.field.entry_rectangle(theta, None)
     source = Source(
         np.sin(theta), np.cos(theta), 0.0, True, launch,

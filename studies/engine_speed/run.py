@@ -12,7 +12,8 @@ from embree_replay import Replay
 from plain import simulate_plainly
 
 import pbrdf
-from pbrdf.tracer.plan import Plan
+from pbrdf.tracer.moments import Moments
+from pbrdf.tracer.plan import Plan, Tally
 from pbrdf.tracer.skips import SKIPS
 from pbrdf.tracer.trace import prepare, trace_sample
 
@@ -123,12 +124,19 @@ def skips(n_rays):
 
 
 def wavelengths(n_rays):
-    """Many wavelengths and fewer Stokes elements over one trace."""
+    """Many wavelengths and fewer Stokes elements over one trace, added to the means."""
     field = prepare(surface(SLOPE).sample(3), frozenset(SKIPS))
 
     def took(**options):
         work = plan(n_rays, **options)
-        return seconds(lambda: trace_sample(field, work, np.random.SeedSequence(1)), 2)
+        moments, tally = Moments(work), Tally.empty(work)
+
+        def one_sample():
+            moments.add(
+                trace_sample(field, work, np.random.SeedSequence(1), tally.emptied())
+            )
+
+        return seconds(one_sample, 2)
 
     one = took()
     print(

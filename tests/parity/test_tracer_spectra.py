@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
 from pbrdf.kernels import bin_fits, fresnel_table, shading
 from pbrdf.kernels.fresnel import reflection_elements
+from pbrdf.tracer import spectra
 from pbrdf.tracer.skips import SKIPS
 
 SURFACE = GaussianSurface(
@@ -68,6 +69,28 @@ def test_sums_by_bin_give_the_light_of_every_path(case):
         assert by_bin.attrs[name] == by_path.attrs[name]
     budget = by_bin.albedo.sum("bounces") + by_bin.truncated + by_bin.leaked
     assert_allclose(budget + by_bin.absorbed + by_bin.left_sideways, 1.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("fold", [False, True])
+def test_paths_that_overflow_their_buffer_are_shaded_too(fold, monkeypatch):
+    """Some hundred times a sample here, and in some samples and directions only."""
+    surface = GaussianSurface(shape=(96, 96), spacing=1.0, corr_length=12.0, slope_rms=0.4)
+    options = {"surface": surface, "phi_i": "uniform", "fold": fold, "gathered": True}
+    plain = run(**options)
+    for rows in (0, 1000):
+        monkeypatch.setattr(spectra, "BUFFER", rows)
+        overflowing = run(**options)
+        for name in VALUES:
+            assert_allclose(overflowing[name], plain[name], rtol=1e-9, atol=1e-13)
+
+
+def test_many_wavelengths_are_folded_as_one_is():
+    surface = GaussianSurface(shape=(96, 96), spacing=1.0, corr_length=12.0, slope_rms=0.4)
+    options = {"surface": surface, "phi_i": "uniform", "fold": True}
+    by_bin, by_path = (run(**options, gathered=gathered) for gathered in (True, False))
+    for name in VALUES:
+        largest = float(np.abs(by_path[name]).max())
+        assert_allclose(by_bin[name], by_path[name], rtol=0, atol=3e-8 * largest)
 
 
 def test_any_number_of_workers_gives_the_same_bits():

@@ -7,7 +7,8 @@ from scipy.stats import chi2
 
 from pbrdf import GaussianSurface, Material, Scene, simulate
 from pbrdf.conventions import detector_bins
-from pbrdf.kernels.neighbours import N_BESIDE, share_noise
+from pbrdf.kernels.neighbours import share_noise
+from pbrdf.tracer.moments import neighbour_room
 
 SURFACE = GaussianSurface(shape=(128, 128), spacing=1.0, corr_length=8.0, slope_rms=0.3)
 FIXED = SURFACE.sample(3)
@@ -134,8 +135,7 @@ def test_a_glint_lends_no_noise_to_the_dark_around_it():
     variance = np.full_like(mean, one**2)
     mean[9, 18], variance[9, 18] = peak, noise**2
     _, _, weight = detector_bins(18, 36)
-    sums, rows = np.empty((2, 18, 36, 1 + N_BESIDE))
-    share_noise(mean, variance, weight, one, sums, rows, np.empty(1))
+    share_noise(mean, variance, weight, one, neighbour_room((18, 36), 1))
     error = np.sqrt(variance)
     assert_allclose(error[9, 18], noise, rtol=0.01)
     error[9, 18] = one
