@@ -100,6 +100,13 @@ def corner_heights(heights, i, j, periodic):
 
 
 @jit(forceinline=True)
+def block_top(maxima, levels, level, i, j):
+    """Highest point of the block of a level, from 1 on, around cell (i, j)."""
+    offset, row = levels[level - 1]
+    return maxima[offset + (i >> level) * row + (j >> level)]
+
+
+@jit(forceinline=True)
 def steps_of(z00, z10, z01, z11, facet):
     """Height step per cell along x and y on one facet, from the corner heights."""
     if facet == FACET_LOW:
@@ -200,6 +207,12 @@ def walk_until(
         if t > t_limit:
             return REACHED, i, j, -1, u, v, z_in, t
 
+        # Look closer unless the ray passes above the whole block: one that rises does so if
+        # it is above where it enters
+        if rising:
+            while level > 0 and z_in <= block_top(maxima, levels, level, i, j):
+                level -= 1
+
         # Where and when the ray leaves the present block
         low_x = (i >> level) << level
         low_y = (j >> level) << level
@@ -212,9 +225,7 @@ def walk_until(
         lowest = z_in if rising else z_out
 
         if level > 0:
-            # Look closer unless the ray passes above the whole block
-            offset, row = levels[level - 1]
-            if lowest <= maxima[offset + (i >> level) * row + (j >> level)]:
+            if not rising and z_out <= block_top(maxima, levels, level, i, j):
                 level -= 1
                 continue
             clear = UNKNOWN
