@@ -13,7 +13,10 @@ from pbrdf.errors import DataFileError
 # A picture that two grey levels explain to less than this shows something else than an
 # edge. Edges reach 0.996 to 1, 0.96 with strong structure inside the material; parts of
 # portraits, cats and tissue 0.6 to 0.95
-MIN_EXPLAINED = 0.9
+MIN_EXPLAINED = 0.93
+# Levels that rise to more than six times their contrast somewhere else bend to follow
+# a scene, unless they explain it all: so does light that falls off by five sixths
+MAX_UNEVEN, EXPLAINED_UNEVEN = 5.0, 0.95
 # An edge with more unclear columns, or with more overhanging ones, is no graph z(x)
 MAX_UNCLEAR, MAX_OVERHANG = 0.3, 0.1
 # Beyond this angle the columns cut the surface too obliquely. [rad]
@@ -46,7 +49,8 @@ def refuse_other_pictures(path: str | Path, levels: Levels, cleaned: np.ndarray)
     explained = (
         1 - float(np.mean((smooth - model) ** 2)) / variance if variance > 0 else 0.0
     )
-    if explained < MIN_EXPLAINED:
+    least = EXPLAINED_UNEVEN if levels.unevenness > MAX_UNEVEN else MIN_EXPLAINED
+    if explained < least:
         problem = (
             f"expected two phases parted by an edge, but they explain only "
             f"{max(explained, 0):.0%} of the picture's contrast"

@@ -278,8 +278,10 @@ def _border_width(mask: np.ndarray, smooth: np.ndarray) -> float:
         return 0.0
     contrast = np.median(smooth[mask]) - np.median(smooth[~mask])
     steepness = np.median(np.hypot(*np.gradient(smooth))[border])
-    # A Gaussian step of width s has the steepest slope contrast / (s sqrt(2 pi))
-    return float(contrast / np.sqrt(2 * np.pi) / max(steepness, 1e-9))
+    # A Gaussian step of width s has the steepest slope contrast / (s sqrt(2 pi)); a border
+    # between equal levels has none, and no step is wider than the picture
+    width = contrast / np.sqrt(2 * np.pi) / max(steepness, 1e-9)
+    return float(min(width, max(mask.shape)))
 
 
 def _robust_fit(basis: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -19,6 +19,7 @@ from data_io import (
     read_profile_images,
     write_profile_overlay,
 )
+from data_io.micrograph_levels import _border_width
 from data_io.micrograph_restore import restore
 from examples.micrograph import Camera, Edge, gaussian_edge, photograph
 from fitting import surface_statistics
@@ -246,6 +247,31 @@ def test_other_pictures_are_refused(tmp_path, name):
     path = save(tmp_path / f"{name}.png", getattr(data, name)())
     with pytest.raises(DataFileError, match="expected"):
         read_profile_images(path, PIXEL)
+
+
+@pytest.mark.parametrize(
+    ("name", "rows", "columns"),
+    [
+        ("coffee", (18, 280), (178, 317)),  # levels that bend round a cup
+        ("coffee", (39, 274), (209, 351)),
+        ("chelsea", (56, 172), (290, 433)),
+        ("astronaut", (218, 331), (309, 444)),  # a dark table, not quite of one grey
+    ],
+)
+def test_parts_that_two_levels_explain_but_for_some_are_refused(
+    tmp_path, name, rows, columns
+):
+    part = getattr(data, name)()[slice(*rows), slice(*columns)]
+    with pytest.raises(DataFileError, match="they explain only"):
+        read_profile_images(save(tmp_path / "part.png", part), PIXEL)
+
+
+def test_a_border_between_equal_levels_is_no_wider_than_the_picture():
+    """Its gradient is rounding alone; the filter's kernel once filled the memory."""
+    smooth = np.zeros((40, 60))
+    smooth[:, :25] = 1.0
+    mask = np.arange(60) < 30
+    assert _border_width(np.broadcast_to(mask, (40, 60)), smooth) <= 60
 
 
 @pytest.mark.slow
