@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from pbrdf.errors import require
 from pbrdf.kernels.shading import base_strength
-from pbrdf.scene import Scene
+from pbrdf.scene import Contamination, Scene, Surface
 from pbrdf.surface import HeightMap
 from pbrdf.validity import geometric_optics_warnings
 
@@ -233,3 +233,36 @@ def one_of(name: str, value: str, known: Iterable[str]) -> str:
         msg = f"{name} must be one of {', '.join(known)}, got {value!r}."
         raise ValueError(msg)
     return value
+
+
+def mirrored(fold: bool, scene: Scene, phi_i: npt.ArrayLike | str) -> bool:
+    """Return `fold`, refused where the mean is not its own mirror image."""
+    symmetric = (
+        isinstance(phi_i, str)
+        and _isotropic(scene.surface)
+        and not any(_pinned(one) for one in scene.contaminants)
+    )
+    if fold and not symmetric:
+        msg = (
+            "fold must be left out where the mean is not its own mirror image, got a "
+            f"{type(scene.surface).__name__}, {len(scene.contaminants)} contaminants and "
+            f"phi_i {phi_i!r}. It takes an isotropic random surface with dx = dy or a flat "
+            'one, bodies drawn anew for every realisation, and phi_i="uniform".'
+        )
+        raise ValueError(msg)
+    return fold
+
+
+def _pinned(contaminant: Contamination) -> bool:
+    """Whether bodies lie at the same places in every realisation."""
+    return any(
+        getattr(contaminant, name, None) is not None for name in ("positions", "seed")
+    )
+
+
+def _isotropic(surface: Surface) -> bool:
+    """Whether a surface is its own mirror image in the mean over azimuth."""
+    if isinstance(surface, HeightMap):
+        return surface.labels is None and not np.ptp(surface.heights)
+    # The diagonal of a cell is its own image where both steps are the same
+    return len({*np.ravel(surface.corr_length)}) == len({*np.ravel(surface.spacing)}) == 1

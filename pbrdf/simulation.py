@@ -14,7 +14,7 @@ from pbrdf import arguments
 from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.shading import N_LEAKED
 from pbrdf.results import to_dataset
-from pbrdf.scene import Contamination, Scene, Surface
+from pbrdf.scene import Scene
 from pbrdf.surface import HeightMap
 from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
@@ -171,7 +171,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
         skips=allowed,
         media=media,
         half_angle=arguments.half_angle(source_half_angle, angles),
-        fold=_mirrored(fold, scene, phi_i),
+        fold=arguments.mirrored(fold, scene, phi_i),
     )
     plans = [plan.at(azimuth) for azimuth in azimuths]
     target = None if target_rel_error is None else arguments.target_error(target_rel_error)
@@ -284,36 +284,3 @@ def _explain(scene: Scene, plan: Plan) -> list[str]:
     sample = surface if isinstance(surface, HeightMap) else surface.sample(0)
     steepest = float(Field.of(sample).terrain.steepest)
     return explanation(plan, periodic=sample.periodic, steepest=steepest)
-
-
-def _mirrored(fold: bool, scene: Scene, phi_i: npt.ArrayLike | str) -> bool:
-    """`fold`, if the scene is its own mirror image in the mean."""
-    symmetric = (
-        isinstance(phi_i, str)
-        and _isotropic(scene.surface)
-        and not any(_pinned(one) for one in scene.contaminants)
-    )
-    if fold and not symmetric:
-        msg = (
-            "fold must be left out where the mean is not its own mirror image, got a "
-            f"{type(scene.surface).__name__}, {len(scene.contaminants)} contaminants and "
-            f"phi_i {phi_i!r}. It takes an isotropic random surface with dx = dy or a flat "
-            'one, bodies drawn anew for every realisation, and phi_i="uniform".'
-        )
-        raise ValueError(msg)
-    return fold
-
-
-def _pinned(contaminant: Contamination) -> bool:
-    """Whether bodies lie at the same places in every realisation."""
-    return any(
-        getattr(contaminant, name, None) is not None for name in ("positions", "seed")
-    )
-
-
-def _isotropic(surface: Surface) -> bool:
-    """Whether a surface is its own mirror image in the mean over azimuth."""
-    if isinstance(surface, HeightMap):
-        return surface.labels is None and not np.ptp(surface.heights)
-    # The diagonal of a cell is its own image where both steps are the same
-    return len({*np.ravel(surface.corr_length)}) == len({*np.ravel(surface.spacing)}) == 1

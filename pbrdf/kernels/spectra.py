@@ -20,6 +20,7 @@ from pbrdf.kernels import jit
 from pbrdf.kernels.binning import bin_of_direction
 from pbrdf.kernels.fresnel_table import table_elements
 from pbrdf.kernels.moments import add_wavelength, fold_wavelength
+from pbrdf.kernels.path_buffer import OVERFLOWED, keep_path, shade_paths
 from pbrdf.kernels.shading import (
     ABSORBED,
     COS_IN,
@@ -27,18 +28,10 @@ from pbrdf.kernels.shading import (
     LABEL,
     N_ESCAPED,
     N_ORDERS,
-    N_RECORD,
     N_SIDE,
     SPECULAR,
     TURN_C,
     TURN_S,
-    add_light,
-    begin_columns,
-    lost_energy,
-    reflect_column,
-    reflect_often,
-    reflect_twice,
-    turn_columns,
 )
 
 N_SUMS = 9  # 1, c_in, s_in, c_out, s_out, and the four products of an in and an out
@@ -48,16 +41,11 @@ BIN_START, BIN_ORDER, BIN_MID, BIN_SCALE, N_BIN = 0, 1, 2, 3, 4
 # for what has overflowed, and the same memory `by_bin` as `pbrdf.kernels.moments` takes
 # it; a matrix (4, 4), its elements (stokes ** 2,) and elements at points (4, MAX_ORDER)
 Room = namedtuple("Room", "flux by_bin mueller matrix factors")
-# First row of a path in the buffer, before its records: fate, bounces, bin
-P_END, P_BOUNCES, P_THETA, P_DPHI = 0, 1, 2, 3
-
 # bins (n_theta, n_dphi, N_BIN); sums (materials, size), of no size where every path is
-# shaded at once; paths, a buffer; state (2,): how much of it is in use, and whether it has
-# overflowed into the tally; the `FresnelTable`; points and powers: Chebyshev points
-# (MAX_ORDER + 1, MAX_ORDER) and the matrices from values there to the factors of the
-# powers; room for elements at the points
+# shaded at once; paths and state (2,), the buffer of `pbrdf.kernels.path_buffer`; the
+# `FresnelTable`; points and powers: Chebyshev points (MAX_ORDER + 1, MAX_ORDER) and the
+# matrices from values there to the factors of the powers; room for elements at the points
 Spectra = namedtuple("Spectra", "bins sums paths state table points powers factors")
-FILL, OVERFLOWED = 0, 1
 
 
 @jit(forceinline=True)
@@ -99,24 +87,6 @@ def add_bounce(record, ray, i_theta, i_dphi, n_stokes, spectra):
 
 
 @jit(forceinline=True)
-def keep_path(end, record, ray, bounces, i_theta, i_dphi, spectra, optics, tally):
-    """Put a path into the buffer; make room first if it is full."""
-    paths, state = spectra.paths, spectra.state
-    if state[FILL] + bounces + 2 > paths.shape[0]:
-        empty_buffer(spectra, optics, tally)
-    row = state[FILL]
-    paths[row, 0, P_END] = end
-    paths[row, 0, P_BOUNCES] = bounces
-    paths[row, 0, P_THETA] = i_theta
-    paths[row, 0, P_DPHI] = i_dphi
-    for bounce in range(bounces + 1):
-        row += 1
-        for column in range(N_RECORD):
-            paths[row, 0, column] = record[bounce, ray, column]
-    state[FILL] = row + 1
-
-
-@jit(forceinline=True)
 def gather_path(
     end, record, ray, bounces, k_x, k_y, k_z, cos_phi_i, sin_phi_i, spectra, optics, tally
 ):  # fmt: skip
@@ -137,76 +107,6 @@ def gather_path(
         add_bounce(record, ray, i_theta, i_dphi, optics.n_stokes, spectra)
     else:
         keep_path(end, record, ray, bounces, i_theta, i_dphi, spectra, optics, tally)
-
-
-@jit(forceinline=True)
-def mirror_path(paths, row, bounces, w, table, n_stokes, mueller):
-    """Mueller matrix of a path of mirror reflections alone, with tabulated elements.
-
-    Returns False where the path left from a diffuse base; its matrix is then not computed.
-    """
-    for bounce in range(bounces):
-        if paths[row + bounce, 0, COS_OUT] != SPECULAR:
-            return False
-    if bounces == 2:
-        a, b, c, d = table_elements(
-            table, w, int(paths[row, 0, LABEL]), paths[row, 0, COS_IN]
-        )
-        a2, b2, c2, d2 = table_elements(
-            table, w, int(paths[row + 1, 0, LABEL]), paths[row + 1, 0, COS_IN]
-        )
-        reflect_twice(
-            a, b, c, d, a2, b2, c2, d2,
-            paths[row, 0, TURN_C], paths[row, 0, TURN_S],
-            paths[row + 1, 0, TURN_C], paths[row + 1, 0, TURN_S],
-            paths[row + 2, 0, TURN_C], paths[row + 2, 0, TURN_S], n_stokes, mueller,
-        )  # fmt: skip
-        return True
-    begin_columns(n_stokes, mueller)
-    for bounce in range(bounces):
-        here = row + bounce
-        turn_columns(paths[here, 0, TURN_C], paths[here, 0, TURN_S], n_stokes, mueller)
-        a, b, c, d = table_elements(
-            table, w, int(paths[here, 0, LABEL]), paths[here, 0, COS_IN]
-        )
-        for column in range(n_stokes):
-            reflect_column(a, b, c, d, column, mueller)
-    here = row + bounces
-    turn_columns(paths[here, 0, TURN_C], paths[here, 0, TURN_S], n_stokes, mueller)
-    return True
-
-
-@jit(forceinline=True)
-def shade_paths(w, spectra, optics, flux, slot, energy, mueller):
-    """Shade the paths of the buffer for wavelength w, which is `slot` of the flux."""
-    paths, table = spectra.paths, spectra.table
-    row = 0
-    while row < spectra.state[FILL]:
-        end = int(paths[row, 0, P_END])
-        bounces = int(paths[row, 0, P_BOUNCES])
-        n_stokes = optics.n_stokes if end == N_ESCAPED else 1
-        if not mirror_path(paths, row + 1, bounces, w, table, n_stokes, mueller):
-            reflect_often(paths[row + 1 :], 0, bounces, w, optics, n_stokes, mueller)
-        energy[w, ABSORBED] -= mueller[0, 0]
-        if end != N_ESCAPED:
-            energy[w, lost_energy(end)] += mueller[0, 0]
-        else:
-            i_theta = int(paths[row, 0, P_THETA])
-            i_dphi = int(paths[row, 0, P_DPHI])
-            order = min(bounces, flux.shape[1]) - 1
-            add_light(mueller, n_stokes, flux, slot, order, i_theta, i_dphi)
-        row += bounces + 2
-
-
-@jit(allocates=False)
-def empty_buffer(spectra, optics, tally):
-    """Shade the paths of the buffer into the tally of all wavelengths."""
-    if not spectra.state[OVERFLOWED]:
-        tally.flux[:] = 0.0
-        spectra.state[OVERFLOWED] = 1
-    for w in range(tally.energy.shape[0]):
-        shade_paths(w, spectra, optics, tally.flux, w, tally.energy, tally.mueller)
-    spectra.state[FILL] = 0
 
 
 @jit(forceinline=True)

@@ -12,7 +12,8 @@ from pbrdf.conventions import detector_bins
 from pbrdf.kernels import neighbours, shading
 from pbrdf.kernels.bin_fits import MAX_ORDER
 from pbrdf.kernels.moments import Running, add_sample, fold_lit, fold_sample
-from pbrdf.kernels.spectra import OVERFLOWED, Room, add_spectrum
+from pbrdf.kernels.path_buffer import OVERFLOWED
+from pbrdf.kernels.spectra import Room, add_spectrum
 from pbrdf.tracer.plan import Plan, Tally
 
 # Wavelengths that one thread adds at a time, and parts of the spectrum at most
