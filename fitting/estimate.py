@@ -61,6 +61,14 @@ class Estimate:
             "high": self.high,
         }
 
+    def reaching(self, low: float, high: float) -> Self:
+        """Widen the interval to these ends, and the standard error with it."""
+        if not np.isfinite(self.stderr):
+            return self
+        low, high = min(low, self.low), max(high, self.high)
+        stderr = max(self.stderr, min(self.value - low, high - self.value) / _NORMAL)
+        return type(self)(self.value, float(stderr), float(low), float(high))
+
     @classmethod
     def undetermined(cls, value: float, *, low: float = 0.0) -> Self:
         """Make a value the data do not determine: any above `low` is possible."""

@@ -6,6 +6,7 @@ import numpy as np
 from scipy import special
 
 from fitting.estimate import Estimate
+from fitting.statistics_deviance import POOR, admitted_ends
 from fitting.statistics_fit import AxisData, AxisFit, jacobian
 from fitting.statistics_lags import Increments
 from fitting.statistics_parts import Autocorrelation, AxisStatistics
@@ -65,10 +66,17 @@ def axis_statistics(
         )
     else:
         length, length_variance = _measured_fall(fit, data)
+    corr_length = _unbiased(length, student * length_variance)
+    slope_rms = _derivative_rms(fit, band, 1, inflation * (1 + 1 / freedom))
+    doubtful = slope_rms.stderr > POOR * slope_rms.value or fit.noise > 0.5 * fit.variance
+    if doubtful and losses is None and data.step == 0:
+        lengths, slopes = admitted_ends(fit, data)
+        corr_length = corr_length.reaching(*lengths)
+        slope_rms = slope_rms.reaching(*slopes)
     return AxisStatistics(
         axis=name,
-        corr_length=_unbiased(length, student * length_variance),
-        slope_rms=_derivative_rms(fit, band, 1, inflation * (1 + 1 / freedom)),
+        corr_length=corr_length,
+        slope_rms=slope_rms,
         curvature_rms=_derivative_rms(fit, band, 2, inflation * (1 + 1 / freedom)),
         cutoff=cutoff,
         autocorrelation=_describe(fit, data),
@@ -187,7 +195,10 @@ def _height_log_variance(fit: AxisFit, square: float, loss: float) -> float:
 
     by_parameter = jacobian(left, fit.parameters)[0]
     gradient = gradient - by_parameter / (1 - loss) @ fit.response
-    # To correct for noise and loss never makes the mean square itself better known
+    # To correct for noise and loss never makes the mean square itself better known, nor
+    # the heights alone better than their independent pieces allow
     plain = float(fit.covariance[0, 0]) / fit.mean_square**2
-    least = max(plain, 2.0 / fit.extent.n_points)
+    pieces = mean_power_of_correlation(fit.correlation, fit.extent.length, 2)
+    alone = 2 * pieces * fit.extent.across * (1 - fit.loss) ** 2
+    least = max(plain, alone, 2.0 / fit.extent.n_points)
     return max(float(gradient @ fit.covariance @ gradient), least)

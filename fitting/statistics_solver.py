@@ -69,7 +69,7 @@ def fit_axis(
     losses_across : ndarray, optional
         Shares that the form's terms take across the axis, for a map.
     """
-    problem = _Problem(data, across, losses_across)
+    problem = AxisProblem(data, across, losses_across)
     if data.step**2 > data.sampling.variance:
         # Lost in the rounding, the form cannot be told
         families = families[:1]
@@ -90,7 +90,7 @@ def fit_axis(
 
 
 @dataclass
-class _Start:
+class Start:
     """Where a fit starts: parameters of a family, on the scale of the data."""
 
     family: Family
@@ -99,7 +99,7 @@ class _Start:
     noise: float
 
 
-class _Problem:
+class AxisProblem:
     """One axis: model of the data, its weights, and the solver."""
 
     def __init__(self, data: AxisData, across: float, losses_across: Array | None) -> None:
@@ -110,21 +110,21 @@ class _Problem:
         self.extent = Extent(sampling.length, sampling.n_points, across)
         self.losses_across = losses_across
 
-    def pilot(self) -> _Start:
+    def pilot(self) -> Start:
         """Guess from the plain autocorrelation; the rounds below mend it."""
         length = min(self.data.sampling.first_fall(), self.extent.length / 4)
         noise = 1e-3 * self.mean_square
-        return _Start(
+        return Start(
             GAUSSIAN, GAUSSIAN.build(np.array([np.log(length)])), self.mean_square, noise
         )
 
-    def solve(self, family: Family, start: "_Start | AxisFit") -> AxisFit:
+    def solve(self, family: Family, start: "Start | AxisFit") -> AxisFit:
         """Fit, renewing lags and weights until the correlation length settles."""
         starts: list[list[float]] | None = None
         if isinstance(start, AxisFit):
             starts = [list(start.parameters[1:-1])]
         for _ in range(_MAX_ROUNDS):
-            self._set_weights(start)
+            self.set_weights(start)
             fit = self._minimise(family, start, starts)
             change = abs(
                 np.log(fit.correlation.corr_length / start.correlation.corr_length)
@@ -132,12 +132,12 @@ class _Problem:
             starts, start = [fit.parameters[1:-1].tolist()], fit
             if change < 2e-3:
                 break
-        self._set_weights(fit)
+        self.set_weights(fit)
         return self._with_errors(fit)
 
     def compare(self, family: Family, reference: AxisFit) -> AxisFit:
         """Fit another family to the same lags with the same weights."""
-        self._set_weights(reference)
+        self.set_weights(reference)
         fit = self._minimise(family, reference, None)
         return fit
 
@@ -145,13 +145,13 @@ class _Problem:
         """Describe the curve by as many Gaussian scales as it takes."""
         self.reach, self.n_lags, self.tolerance = _WIDE_REACH, _WIDE_LAGS, _TOLERANCE
         length = min(self.data.sampling.first_fall(), self.extent.length / 4)
-        at = _Start(
+        at = Start(
             reference.family, reference.correlation, reference.variance, reference.noise
         )
         scale = length / at.correlation.corr_length
         stretched = at.correlation.stretched(scale)
-        at = _Start(reference.family, stretched, at.variance, at.noise)
-        self._set_weights(at)
+        at = Start(reference.family, stretched, at.variance, at.noise)
+        self.set_weights(at)
         lags = self.found.lags
         blur = self.data.blur
         least = max(2 * self.data.sampling.spacing, blur)
@@ -171,12 +171,13 @@ class _Problem:
             return reference
         lengths, shares = lengths[used], weights[:-1][used]
         family = multi_scale_family(lengths, shares / shares.sum())
-        start = _Start(
+        start = Start(
             family, family.build(np.array(family.starts(1.0)[0])), shares.sum(), weights[-1]
         )
         return self._with_errors(self._minimise(family, start, None))
 
-    def _set_weights(self, at: "_Start | AxisFit") -> None:
+    def set_weights(self, at: "Start | AxisFit") -> None:
+        """Choose lags, and weigh them as they would scatter about this surface."""
         data, correlation = self.data, at.correlation
         length = float(np.clip(correlation.corr_length, 0, self.extent.length / 3))
         self.found = data.sampling.increments(self.reach * length, self.n_lags)
@@ -233,7 +234,7 @@ class _Problem:
         return float(min(total, 0.9))
 
     def _minimise(
-        self, family: Family, start: "_Start | AxisFit", starts: list[list[float]] | None
+        self, family: Family, start: "Start | AxisFit", starts: list[list[float]] | None
     ) -> AxisFit:
         length = start.correlation.corr_length
         # Shorter than the spacing, roughness is noise; shorter than the blur, it is gone
