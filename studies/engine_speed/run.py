@@ -100,7 +100,7 @@ def workers(n_rays):
 
     def took(count):
         def work():
-            pbrdf.simulate(scene, THETA, n_rays=n_rays, realizations=8, workers=count)
+            pbrdf.simulate(scene, THETA, n_rays=n_rays, realizations=32, workers=count)
 
         return seconds(work, clock=time.perf_counter)
 
