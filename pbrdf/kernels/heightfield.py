@@ -336,19 +336,28 @@ def walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, m
 
 
 @jit(forceinline=True)
-def leave_facet(terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate, max_steps):
-    """Follow a ray along the unit vector k from a facet to the next one it meets.
+def rises_free(terrain, i, j, z, k_x, k_y, k_z):
+    """Whether a ray along the unit vector k from the surface in cell (i, j) must escape.
 
-    A ray that rises more steeply than any facet can meet none, nor one that rises above all
+    One that rises more steeply than any facet can meet none, nor one that rises above all
     that lies ahead.
     """
     free_slope = terrain.free_slope
     if k_z > 0.0 and k_z * k_z >= free_slope * free_slope * (k_x * k_x + k_y * k_y):
+        return True
+    if terrain.horizon.size == 0:
+        return False
+    return is_free(
+        terrain.horizon, terrain.z_top, i, j, z, k_x * (1.0 / terrain.pitch_x),
+        k_y * (1.0 / terrain.pitch_y), k_z,
+    )  # fmt: skip
+
+
+@jit(forceinline=True)
+def leave_facet(terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate, max_steps):
+    """Follow a ray along the unit vector k from a facet to the next one it meets."""
+    if rises_free(terrain, i, j, z, k_x, k_y, k_z):
         return ESCAPED, i, j, -1, u, v, z
     speed_x = k_x * (1.0 / terrain.pitch_x)
     speed_y = k_y * (1.0 / terrain.pitch_y)
-    if terrain.horizon.size > 0 and is_free(
-        terrain.horizon, terrain.z_top, i, j, z, speed_x, speed_y, k_z
-    ):
-        return ESCAPED, i, j, -1, u, v, z
     return walk(terrain, i, j, facet, u, v, z, speed_x, speed_y, k_z, leave_rate, max_steps)

@@ -7,8 +7,8 @@ from pbrdf.kernels import jit
 from pbrdf.kernels.frames import turn_frame
 from pbrdf.kernels.fresnel import reflection_elements
 from pbrdf.kernels.observe_lens import carried_axis
+from pbrdf.kernels.ray_bounce import bounce
 from pbrdf.kernels.shading import reflect_once
-from pbrdf.kernels.transport import bounce
 
 # Axes of both cones, their horizontal s axes (x, y; of the detector's beam sent backwards
 # and of the source's beam likewise), and their half-angles with cosines and sines

@@ -35,6 +35,7 @@ from pbrdf.kernels.observe_targets import (
     place_axes,
 )
 from pbrdf.kernels.random import uniform_pair
+from pbrdf.kernels.ray_bounce import bounce, scatter
 from pbrdf.kernels.shading import (
     COS_IN,
     COS_OUT,
@@ -49,7 +50,7 @@ from pbrdf.kernels.shading import (
     TURN_C,
     TURN_S,
 )
-from pbrdf.kernels.transport import MAX_STEPS, bounce, scatter
+from pbrdf.kernels.transport import MAX_STEPS
 
 # Bundles of one cone: zenith and azimuth of its axis (uniform: any azimuth), half-angle,
 # the entry rectangle (corner x, y and lengths [cells]), lines and rays, five random shifts

@@ -4,7 +4,8 @@ import math
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.heightfield import ESCAPED, HIT, SIDE, facet_slopes, leave_facet, walk
-from pbrdf.kernels.transport import MAX_STEPS, mirror
+from pbrdf.kernels.ray_bounce import mirror
+from pbrdf.kernels.transport import MAX_STEPS
 
 MOST_BOUNCES = 8
 

@@ -38,6 +38,7 @@ from pbrdf.kernels.events import (
     next_event,
 )
 from pbrdf.kernels.interfaces import turn_columns
+from pbrdf.kernels.ray_bounce import exit_turn
 from pbrdf.kernels.shading import (
     LEAKED,
     N_ESCAPED,
@@ -59,7 +60,6 @@ from pbrdf.kernels.splitting import (
     survives,
 )
 from pbrdf.kernels.sweep import sweep_line
-from pbrdf.kernels.transport import exit_turn
 
 MAX_STEPS = 10_000_000  # of one ray with all its parts
 

@@ -9,6 +9,7 @@ from pbrdf.kernels.beams import N_STATE, Room
 from pbrdf.kernels.binning import bin_edges
 from pbrdf.kernels.entry import Source
 from pbrdf.kernels.events import N_HIT
+from pbrdf.kernels.first_bounce import N_MIRRORED, LineRoom
 from pbrdf.kernels.horizon import NO_HORIZON
 from pbrdf.kernels.spectra import close_sums
 from pbrdf.kernels.sweep import N_FIRST
@@ -74,10 +75,13 @@ def trace_sample(
         walks = not isinstance(target, EmbreeField)
         sweeps = walks and field.periodic and "sweep" in plan.skips
         longest = -(-source.n_rays // source.n_lines) if sweeps else 0
-        meetings = np.empty((longest, N_FIRST))
+        line = LineRoom(
+            np.empty((longest, N_FIRST)), np.empty((2, longest)),
+            np.empty(longest * N_MIRRORED),
+        )  # fmt: skip
         if isinstance(target, WetField):
             places = Room(
-                np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT), meetings
+                np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT), line.meetings
             )
             trace_among_bodies(
                 target.world, source, field.terrain.z_top, plan.max_bounces,
@@ -87,7 +91,7 @@ def trace_sample(
         light = tally.spectra[index] if tally.spectra else NOTHING
         if sweeps:
             sweep_batch(
-                field.terrain, source, meetings, record, waiting, light, plan.optics, bins
+                field.terrain, source, line, record, waiting, light, plan.optics, bins
             )
         else:
             tree = None if isinstance(target, Field) else target.tree()
