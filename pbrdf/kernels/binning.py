@@ -56,20 +56,30 @@ def rough_azimuth(x, y):
 
 
 @jit(forceinline=True)
-def bin_of_direction(x, y, z, cos_phi_i, sin_phi_i, zenith, azimuth):
-    """Bin (theta_s, dphi) of a unit direction above the surface, by `bin_edges`."""
-    n_theta = zenith.shape[0] - 1
-    i_theta = min(int(rough_arccos(z) * (n_theta / HALF_PI)), n_theta - 1)
+def rough_place(x, y, z, cos_phi_i, sin_phi_i, n_theta, n_dphi):
+    """Zenith angle and azimuth from the source of a unit direction, counted in bins."""
+    # Turn the direction by -phi_i
+    along = x * cos_phi_i + y * sin_phi_i
+    across = y * cos_phi_i - x * sin_phi_i
+    return (
+        rough_arccos(z) * (n_theta / HALF_PI),
+        rough_azimuth(along, across) * (n_dphi / TWO_PI) + 0.5,
+    )
+
+
+@jit(forceinline=True)
+def exact_bin(theta, dphi, x, y, z, cos_phi_i, sin_phi_i, zenith, azimuth):
+    """Bin (theta_s, dphi) of a unit direction above the surface, from its rough place."""
+    i_theta = min(int(theta), zenith.shape[0] - 2)
     while z > zenith[i_theta]:
         i_theta -= 1
     while z <= zenith[i_theta + 1]:
         i_theta += 1
 
-    # Azimuth from the source: turn the direction by -phi_i
     n_dphi = azimuth.shape[0]
     along = x * cos_phi_i + y * sin_phi_i
     across = y * cos_phi_i - x * sin_phi_i
-    i_dphi = int(rough_azimuth(along, across) * (n_dphi / TWO_PI) + 0.5)
+    i_dphi = int(dphi)
     if i_dphi >= n_dphi:
         i_dphi -= n_dphi
     # Clockwise of the lower edge, or not clockwise of the upper one
@@ -82,3 +92,11 @@ def bin_of_direction(x, y, z, cos_phi_i, sin_phi_i, zenith, azimuth):
         i_dphi = upper
         upper = i_dphi + 1 if i_dphi + 1 < n_dphi else 0
     return i_theta, i_dphi
+
+
+@jit(forceinline=True)
+def bin_of_direction(x, y, z, cos_phi_i, sin_phi_i, zenith, azimuth):
+    """Bin (theta_s, dphi) of a unit direction above the surface, by `bin_edges`."""
+    n_theta, n_dphi = zenith.shape[0] - 1, azimuth.shape[0]
+    theta, dphi = rough_place(x, y, z, cos_phi_i, sin_phi_i, n_theta, n_dphi)
+    return exact_bin(theta, dphi, x, y, z, cos_phi_i, sin_phi_i, zenith, azimuth)

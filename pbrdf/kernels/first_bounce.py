@@ -7,6 +7,7 @@ The rays of a line share their direction and frame. What becomes of them at the 
 from collections import namedtuple
 
 from pbrdf.kernels import jit
+from pbrdf.kernels.binning import exact_bin, rough_place
 from pbrdf.kernels.frames import turn_frame
 from pbrdf.kernels.heightfield import corner_heights
 from pbrdf.kernels.ray_bounce import exit_turn, mirror, new_axis
@@ -26,18 +27,9 @@ from pbrdf.kernels.spectra import gather_path
 from pbrdf.kernels.sweep import F_FACET, F_I, F_J
 
 # Numbers of a mirrored ray: direction, cosine of incidence, turn of the frame into the
-# plane of incidence and from there to the meridian of the exit
-M_X, M_Y, M_Z, M_COS, M_IN_C, M_IN_S, M_OUT_C, M_OUT_S, N_MIRRORED = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    7,
-    8,
-)
+# plane of incidence and from there to the meridian of the exit, rough place in bins
+M_X, M_Y, M_Z, M_COS, M_IN_C, M_IN_S, M_OUT_C, M_OUT_S = 0, 1, 2, 3, 4, 5, 6, 7
+M_THETA, M_DPHI, N_MIRRORED = 8, 9, 10
 # Room for the longest line: first facets (rays, N_FIRST) of `sweep_line`, their slopes (2,
 # rays) and `mirrored` (rays * N_MIRRORED,)
 LineRoom = namedtuple("LineRoom", "meetings slopes mirrored")
@@ -60,7 +52,7 @@ def slopes_of_line(terrain, meetings, rays, slopes):
 
 
 @jit(forceinline=True)
-def mirror_line(beam, rays, slopes, mirrored):
+def mirror_line(beam, rays, slopes, n_theta, n_dphi, mirrored):
     """Reflect all rays of a line, into `mirrored` (rays * N_MIRRORED,).
 
     The array is flat so that the compiler sees that rays do not touch each other.
@@ -85,6 +77,9 @@ def mirror_line(beam, rays, slopes, mirrored):
         mirrored[at + M_IN_S] = in_s
         mirrored[at + M_OUT_C] = out_c
         mirrored[at + M_OUT_S] = out_s
+        mirrored[at + M_THETA], mirrored[at + M_DPHI] = rough_place(
+            r_x, r_y, r_z, cos_phi, sin_phi, n_theta, n_dphi
+        )
 
 
 @jit(forceinline=True)
@@ -98,15 +93,14 @@ def end_after_one(mirrored, at, label, cos_phi, sin_phi, record, spectra, optics
     record[1, 0, TURN_C] = mirrored[at + M_OUT_C]
     record[1, 0, TURN_S] = mirrored[at + M_OUT_S]
     tally.counts[N_SEGMENTS] += 2
+    i_theta, i_dphi = exact_bin(
+        mirrored[at + M_THETA], mirrored[at + M_DPHI],
+        mirrored[at + M_X], mirrored[at + M_Y], mirrored[at + M_Z],
+        cos_phi, sin_phi, tally.zenith, tally.azimuth,
+    )  # fmt: skip
     if spectra.sums.size > 0:
-        gather_path(
-            N_ESCAPED, record, 0, 1, mirrored[at + M_X], mirrored[at + M_Y],
-            mirrored[at + M_Z], cos_phi, sin_phi, spectra, optics, tally,
-        )  # fmt: skip
+        gather_path(N_ESCAPED, record, 0, 1, i_theta, i_dphi, spectra, optics, tally)
         return
     for w in range(tally.energy.shape[0]):
         tally.energy[w, ABSORBED] += 1.0
-    tally_path(
-        N_ESCAPED, record, 0, 1, mirrored[at + M_X], mirrored[at + M_Y], mirrored[at + M_Z],
-        cos_phi, sin_phi, optics, tally,
-    )  # fmt: skip
+    tally_path(N_ESCAPED, record, 0, 1, i_theta, i_dphi, optics, tally)

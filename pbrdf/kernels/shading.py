@@ -11,7 +11,6 @@ more than the arithmetic on it.)
 from collections import namedtuple
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.binning import bin_of_direction
 from pbrdf.kernels.fresnel import reflection_elements, transmission_elements
 from pbrdf.kernels.volume import internal_reflectance
 
@@ -235,15 +234,13 @@ def add_light(mueller, n_stokes, flux, w, order, i_theta, i_dphi):
 
 
 @jit(forceinline=True)
-def tally_path(
-    end, record, ray, bounces, k_x, k_y, k_z, cos_phi_i, sin_phi_i, optics, tally
-):  # fmt: skip
+def tally_path(end, record, ray, bounces, i_theta, i_dphi, optics, tally):
     """Count a path and add its light to its bin, or to what was lost.
 
-    `end` is one of the N_ constants. ABSORBED falls by what the path still carries: one
-    unit for each ray that enters is added elsewhere. Without a diffuse base a ray is one
-    path, and one that leaves a finite map sideways takes its unit back: it belongs to
-    neither part of the fraction.
+    `end` is one of the N_ constants; only with N_ESCAPED is the bin looked at. ABSORBED
+    falls by what the path still carries: one unit for each ray that enters is added
+    elsewhere. Without a diffuse base a ray is one path, and one that leaves a finite map
+    sideways takes its unit back: it belongs to neither part of the fraction.
     """
     flux, energy, mueller = tally.flux, tally.energy, tally.mueller
     n_stokes = optics.n_stokes
@@ -259,9 +256,6 @@ def tally_path(
             energy[w, ABSORBED] -= mueller[0, 0]
             energy[w, lost] += mueller[0, 0]
         return
-    i_theta, i_dphi = bin_of_direction(
-        k_x, k_y, k_z, cos_phi_i, sin_phi_i, tally.zenith, tally.azimuth
-    )
     order = min(bounces, flux.shape[1]) - 1
     tally.counts[N_ORDERS + order] += 1
     tally.lit[order, i_theta, i_dphi] = True

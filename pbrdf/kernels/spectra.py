@@ -17,7 +17,6 @@ in the cache, serves all. A buffer that overflows is shaded into a tally of all 
 from collections import namedtuple
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.binning import bin_of_direction
 from pbrdf.kernels.fresnel_table import table_elements
 from pbrdf.kernels.moments import add_wavelength, fold_wavelength
 from pbrdf.kernels.path_buffer import OVERFLOWED, keep_path, shade_paths
@@ -87,18 +86,13 @@ def add_bounce(record, ray, i_theta, i_dphi, n_stokes, spectra):
 
 
 @jit(forceinline=True)
-def gather_path(
-    end, record, ray, bounces, k_x, k_y, k_z, cos_phi_i, sin_phi_i, spectra, optics, tally
-):  # fmt: skip
+def gather_path(end, record, ray, bounces, i_theta, i_dphi, spectra, optics, tally):
     """Count a path and keep what all wavelengths need of it; see `shading.tally_path`."""
     tally.counts[end] += 1
     if end != N_ESCAPED:
         if end != N_SIDE or optics.base.shape[1] > 0:
             keep_path(end, record, ray, bounces, 0, 0, spectra, optics, tally)
         return
-    i_theta, i_dphi = bin_of_direction(
-        k_x, k_y, k_z, cos_phi_i, sin_phi_i, tally.zenith, tally.azimuth
-    )
     order = min(bounces, tally.flux.shape[1]) - 1
     tally.counts[N_ORDERS + order] += 1
     tally.lit[order, i_theta, i_dphi] = True

@@ -7,6 +7,7 @@ the record up to its own hit.
 """
 
 from pbrdf.kernels import jit
+from pbrdf.kernels.binning import bin_of_direction
 from pbrdf.kernels.embree import SELF, seek
 from pbrdf.kernels.entry import entry_line, first_ray, line_beam, wrap_into
 from pbrdf.kernels.first_bounce import (
@@ -159,15 +160,15 @@ def trace_ray(
             end = N_ESCAPED
         elif fate == SELF:
             tally.counts[N_SELF] += 1
-        if gathers:
-            gather_path(
-                end, record, 0, bounces, k_x, k_y, k_z, cos_phi, sin_phi,
-                spectra, optics, tally,
-            )  # fmt: skip
-        else:
-            tally_path(
-                end, record, 0, bounces, k_x, k_y, k_z, cos_phi, sin_phi, optics, tally
+        i_theta = i_dphi = 0
+        if end == N_ESCAPED:
+            i_theta, i_dphi = bin_of_direction(
+                k_x, k_y, k_z, cos_phi, sin_phi, tally.zenith, tally.azimuth
             )
+        if gathers:
+            gather_path(end, record, 0, bounces, i_theta, i_dphi, spectra, optics, tally)
+        else:
+            tally_path(end, record, 0, bounces, i_theta, i_dphi, optics, tally)
         if n_waiting == 0:
             break
 
@@ -234,6 +235,7 @@ def sweep_batch(terrain, source, line_room, record, waiting, spectra, optics, ta
     meetings, slopes, mirrored = line_room
     together = optics.base.shape[1] == 0
     labels = terrain.labels
+    n_theta, n_dphi = tally.zenith.shape[0] - 1, tally.azimuth.shape[0]
     for line in range(source.n_lines):
         beam = line_beam(line, source)
         first = first_ray(line, source)
@@ -241,7 +243,7 @@ def sweep_batch(terrain, source, line_room, record, waiting, spectra, optics, ta
         sweep_line(terrain, line, source, terrain.z_top, meetings)
         if together:
             slopes_of_line(terrain, meetings, rays, slopes)
-            mirror_line(beam, rays, slopes, mirrored)
+            mirror_line(beam, rays, slopes, n_theta, n_dphi, mirrored)
         for ray in range(rays):
             i, j, z = int(meetings[ray, F_I]), int(meetings[ray, F_J]), meetings[ray, F_Z]
             at = ray * N_MIRRORED
