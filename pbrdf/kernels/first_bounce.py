@@ -9,7 +9,7 @@ from collections import namedtuple
 from pbrdf.kernels import jit
 from pbrdf.kernels.binning import exact_bin, rough_place
 from pbrdf.kernels.frames import turn_frame
-from pbrdf.kernels.heightfield import corner_heights
+from pbrdf.kernels.heightfield import corner_heights, steps_of
 from pbrdf.kernels.ray_bounce import exit_turn, mirror, new_axis
 from pbrdf.kernels.shading import (
     ABSORBED,
@@ -44,11 +44,9 @@ def slopes_of_line(terrain, meetings, rays, slopes):
         z00, z10, z01, z11 = corner_heights(
             terrain.heights, int(meetings[ray, F_I]), int(meetings[ray, F_J]), True
         )
-        low = meetings[ray, F_FACET] == 0.0
-        middle = z10 if low else z01
-        first, second = middle - z00, z11 - middle
-        slopes[0, ray] = (first if low else second) * per_x
-        slopes[1, ray] = (second if low else first) * per_y
+        step_x, step_y = steps_of(z00, z10, z01, z11, int(meetings[ray, F_FACET]))
+        slopes[0, ray] = step_x * per_x
+        slopes[1, ray] = step_y * per_y
 
 
 @jit(forceinline=True)

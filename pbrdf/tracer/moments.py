@@ -190,11 +190,11 @@ def _by_bin(flux: np.ndarray) -> np.ndarray:
 def _add_part(
     plan: Plan, tally: Tally, angle: int, counted: int, running: Running, part: _Part
 ) -> None:
+    """Shade and add some wavelengths of one direction of a sample, of `counted` rays."""
     light, room = tally.spectra[angle], part.room
     if light.state[OVERFLOWED]:
         flux = tally.flux[angle]
         room = room._replace(flux=flux, by_bin=_by_bin(flux))
-    # Without a diffuse base a ray that left sideways takes its unit of light back
     add_spectrum(
         part.first, part.last, counted, light, plan.optics, plan.fold, tally.lit[angle],
         tally.energy[angle], room, running,
