@@ -65,7 +65,7 @@ def explanation(plan: Plan, *, periodic: bool, steepest: float) -> list[str]:
         lines.append("All but M00: not computed (paths stay polarised inside).")
     if len(plan.n) > 1 and plan.media is None:
         lines.append(f"Tracing for {len(plan.n) - 1} of {len(plan.n)} wavelengths: shared.")
-    if plan.spectrum is not None and plan.media is None:
+    if plan.spectrum is not None:
         lines.append(
             "Single bounces: summed by bin, and shaded once a bin and wavelength, to "
             f"{TOLERANCE:g} of M00."

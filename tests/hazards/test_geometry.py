@@ -16,6 +16,7 @@ from pbrdf.kernels import jit
 from pbrdf.kernels.embree import first_face
 from pbrdf.kernels.heightfield import HIT, walk
 from pbrdf.tracer import embree
+from pbrdf.tracer.embree import library as load_embree
 from pbrdf.tracer.field import Field
 
 ANGLES = np.deg2rad([10.0, 60.0, 85.0])
@@ -263,22 +264,22 @@ def test_b06_grazing_bins_converge_with_the_cells_of_a_correlation_length():
 class SlowToStart:
     """Embree's library, whose devices wait until another thread asks for one as well."""
 
-    def __init__(self, library):
-        self.library = library
+    def __init__(self, real):
+        self.real = real
         self.second = threading.Barrier(2)
 
     def __getattr__(self, name):
-        return getattr(self.library, name)
+        return getattr(self.real, name)
 
     def rtcNewDevice(self, config):
         with contextlib.suppress(threading.BrokenBarrierError):
             self.second.wait(timeout=1.0)
-        return self.library.rtcNewDevice(config)
+        return self.real.rtcNewDevice(config)
 
 
 def test_threads_that_start_embree_at_once_share_one_device(monkeypatch):
     """A geometry of one device in a scene of another made a tree that no ray hits."""
-    slow = SlowToStart(embree.library())
+    slow = SlowToStart(load_embree())
     monkeypatch.setattr(embree, "library", lambda: slow)
     made = functools.cache(embree._make_device.__wrapped__)
     monkeypatch.setattr(embree, "_make_device", made)
