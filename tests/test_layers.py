@@ -25,7 +25,9 @@ KERNEL_IMPORTS = {
     "os",
     "pathlib",
     "types",
+    "tempfile",
     "typing",
+    "warnings",
 }
 
 
@@ -69,7 +71,9 @@ def test_imports_stay_in_their_layer(source: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "source", sorted((ROOT / "pbrdf/kernels").glob("*.py")), ids=lambda path: path.name
+    "source",
+    sorted((ROOT / "pbrdf/kernels").rglob("*.py")),
+    ids=lambda path: str(path.relative_to(ROOT / "pbrdf/kernels")),
 )
 def test_kernels_know_numbers_and_each_other_only(source: Path) -> None:
     strange = {

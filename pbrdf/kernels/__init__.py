@@ -8,26 +8,56 @@ Numba version: editing any kernel starts a fresh cache.
 
 import hashlib
 import os
+import tempfile
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numba
 
-__all__ = ["cache_folder", "jit"]
+__all__ = ["cache_folder", "jit", "kernel_sources"]
+
+
+def kernel_sources() -> list[Path]:
+    """Every source file that the hash of the cache covers: the whole tree of kernels."""
+    return sorted(Path(__file__).parent.rglob("*.py"))
 
 
 def cache_folder() -> Path:
     """Folder of the compiled kernels: PBRDF_CACHE_DIR or ~/.cache/pbrdf, then the hash."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.name.encode() + source.read_bytes())
-    root = os.environ.get("PBRDF_CACHE_DIR")
-    base = Path(root) if root else Path.home() / ".cache" / "pbrdf"
+    root = Path(__file__).parent
+    for source in kernel_sources():
+        digest.update(source.relative_to(root).as_posix().encode() + source.read_bytes())
+    chosen = os.environ.get("PBRDF_CACHE_DIR")
+    base = Path(chosen) if chosen else Path.home() / ".cache" / "pbrdf"
     return base / f"kernels-{digest.hexdigest()[:16]}"
 
 
-_FOLDER = str(cache_folder())
+def _usable(folder: Path) -> bool:
+    """Whether compiled kernels can be kept in this folder.
+
+    Where it cannot be written, Numba would keep them beside the sources, under a key that
+    knows nothing of edited callees, and return old answers.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError as error:
+        warnings.warn(
+            f"Compiled kernels cannot be kept in {folder} ({error.strerror or error}): "
+            "they are compiled anew in each process. Set PBRDF_CACHE_DIR to a folder that "
+            "can be written.",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return False
+
+
+_FOLDER = cache_folder()
+_KEPT = _usable(_FOLDER)
 
 
 def jit(
@@ -41,13 +71,13 @@ def jit(
     """
     if function is None:
         return lambda kernel: jit(kernel, allocates=allocates, **options)
-    settings: Any = {"nogil": True, "cache": True, "error_model": "numpy"} | options
+    settings: Any = {"nogil": True, "cache": _KEPT, "error_model": "numpy"} | options
     if not allocates:
         settings["_nrt"] = False
     # Numba reads its cache folder when a function is decorated, and only there
     config: Any = numba.config
     previous = config.CACHE_DIR
-    config.CACHE_DIR = _FOLDER
+    config.CACHE_DIR = str(_FOLDER)
     try:
         return numba.njit(**settings)(function)
     finally:

@@ -16,10 +16,10 @@ term.
 
 from math import cos, sin, sqrt
 
-from . import jit
-from .facet import Directions, Facet, rotated_elements
-from .fresnel import facet_elements
-from .slopes import mean_overhang, slope_along, slope_density
+from pbrdf.kernels import jit
+from pbrdf.kernels.facet import Directions, Facet, rotated_elements
+from pbrdf.kernels.fresnel import facet_elements
+from pbrdf.kernels.slopes import mean_overhang, slope_along, slope_density
 
 __all__ = ["fill_second_bounce"]
 

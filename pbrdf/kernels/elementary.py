@@ -9,7 +9,7 @@ from math import factorial, log, pi
 
 import numpy as np
 
-from . import jit
+from pbrdf.kernels import jit
 
 __all__ = ["cos", "erf", "exp", "sin"]
 

@@ -15,9 +15,9 @@ incidence and grazing, where sines and cosines enter as themselves.
 from collections import namedtuple
 from math import sqrt
 
-from . import jit
-from .elementary import cos, sin
-from .fresnel import select
+from pbrdf.kernels import jit
+from pbrdf.kernels.elementary import cos, sin
+from pbrdf.kernels.fresnel import select
 
 __all__ = [
     "Directions",

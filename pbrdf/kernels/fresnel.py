@@ -16,7 +16,7 @@ n = 1e6 and for kappa of 1e-8. (3) to (8) are the squared moduli of the same two
 
 from math import inf, sqrt
 
-from . import jit
+from pbrdf.kernels import jit
 
 __all__ = [
     "fill_amplitudes",

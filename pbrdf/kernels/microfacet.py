@@ -2,19 +2,19 @@
 
 from collections import namedtuple
 
-from . import jit
-from .elementary import cos, sin
-from .facet import directions, mirror_facet, rotated_elements
-from .fresnel import facet_elements
-from .shadowing import (
+from pbrdf.kernels import jit
+from pbrdf.kernels.elementary import cos, sin
+from pbrdf.kernels.facet import directions, mirror_facet, rotated_elements
+from pbrdf.kernels.fresnel import facet_elements
+from pbrdf.kernels.shadowing import (
     SMITH_CORRELATED,
     TORRANCE_SPARROW,
     Shadowing,
     combined_overhangs,
     shadowing_factor,
 )
-from .slopes import GAUSSIAN, Roughness, slope_density
-from .volume import Diffuse, added_elements, base_radiance
+from pbrdf.kernels.slopes import GAUSSIAN, Roughness, slope_density
+from pbrdf.kernels.volume import Diffuse, added_elements, base_radiance
 
 __all__ = [
     "Surface",

@@ -3,10 +3,10 @@
 from collections import namedtuple
 from math import atan2, sqrt
 
-from . import jit
-from .elementary import erf, exp
-from .fresnel import TINY, select
-from .slopes import mean_overhang, slope_along, steepness
+from pbrdf.kernels import jit
+from pbrdf.kernels.elementary import erf, exp
+from pbrdf.kernels.fresnel import TINY, select
+from pbrdf.kernels.slopes import mean_overhang, slope_along, steepness
 
 __all__ = [
     "MAXWELL_BEARD",

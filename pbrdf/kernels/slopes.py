@@ -10,9 +10,9 @@ from math import atan2, log, pi, sqrt
 
 import numpy as np
 
-from . import jit
-from .elementary import erf, exp
-from .fresnel import TINY, select
+from pbrdf.kernels import jit
+from pbrdf.kernels.elementary import erf, exp
+from pbrdf.kernels.fresnel import TINY, select
 
 __all__ = [
     "EXPONENTIAL",

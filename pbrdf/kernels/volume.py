@@ -5,8 +5,8 @@ from math import pi
 
 import numpy as np
 
-from . import jit
-from .fresnel import facet_elements, select, transmission_parts
+from pbrdf.kernels import jit
+from pbrdf.kernels.fresnel import facet_elements, select, transmission_parts
 
 __all__ = [
     "BASE",
