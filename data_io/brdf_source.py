@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 
-from data_io._frames import rotation
+from data_io.goniometer.frames import rotation
 from pbrdf.analytic import MicrofacetModel
 from pbrdf.errors import AccuracyWarning
 

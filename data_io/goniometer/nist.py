@@ -29,8 +29,8 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io._frames import rotation
 from data_io._text import Line, Rows, is_comment, read_numbers
+from data_io.goniometer.frames import rotation
 from data_io.goniometer.scan import ELEMENTS, Scan
 from pbrdf.errors import DataFileError
 
