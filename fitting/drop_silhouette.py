@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from data_io.micrograph_levels import load_grey
+from data_io.micrograph.levels import load_grey
 from fitting.drop_contour import DropContour, find_drop
 from fitting.drop_shapes import ShapeFit, fit_arc, fit_laplace
 from fitting.estimate import Estimate

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import xarray as xr
 
-from data_io._text import Line, is_comment, read_lines
 from data_io.goniometer import fred, nist, own_csv, spacecraft, zemax
 from data_io.goniometer.scan import QUANTITIES, Scan, to_dataset
+from data_io.text.text import Line, is_comment, read_lines
 from pbrdf.errors import DataFileError
 
 _READERS: dict[str, Callable[[Path, list[Line]], Scan]] = {

@@ -29,9 +29,9 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io._text import Line, Rows, is_comment, read_numbers
 from data_io.goniometer.frames import rotation
 from data_io.goniometer.scan import ELEMENTS, Scan
+from data_io.text.text import Line, Rows, is_comment, read_numbers
 from pbrdf.errors import DataFileError
 
 _GEOMETRY = ("lambda", "thetai", "phii", "thetar", "phir")

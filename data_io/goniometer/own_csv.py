@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from data_io._text import Line, is_comment, is_number
-from data_io._write import complete_file
 from data_io.goniometer.scan import CONVENTIONS, QUANTITIES, STDERR, Scan
+from data_io.text.text import Line, is_comment, is_number
+from data_io.text.write import complete_file
 from pbrdf.errors import DataFileError
 
 GEOMETRY = ("theta_i_deg", "theta_s_deg", "dphi_deg", "theta_view_deg")

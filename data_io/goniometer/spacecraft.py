@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io._text import Line, Rows, is_comment, read_numbers
 from data_io.goniometer.scan import Scan
+from data_io.text.text import Line, Rows, is_comment, read_numbers
 from pbrdf.errors import DataFileError
 
 _COLUMNS = ["phi_i", "theta_i", "phi_o", "theta_o", "brdf"]

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io._text import Line, is_comment, is_number
 from data_io.goniometer.scan import Scan
+from data_io.text.text import Line, is_comment, is_number
 from pbrdf.errors import DataFileError
 
 _AXES = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")

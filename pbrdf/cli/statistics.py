@@ -102,7 +102,7 @@ def statistics(
 def _draw_overlay(overlay: Path, surface: Path, heights: Any, *, force: bool) -> None:
     """Write the micrograph with its edge drawn in."""
     from data_io import write_profile_overlay
-    from data_io.micrograph import EdgeProfile
+    from data_io.micrograph.read import EdgeProfile
     from pbrdf.cli.staging import staged_file
 
     if not isinstance(heights, EdgeProfile):

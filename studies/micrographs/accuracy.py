@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from skimage.io import imsave
 
 from data_io import Profile
-from data_io.micrograph import read_profile_image
+from data_io.micrograph.read import read_profile_image
 from examples.micrograph import Camera, Edge, gaussian_edge, photograph
 from fitting import surface_statistics
 

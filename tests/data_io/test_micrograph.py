@@ -19,8 +19,8 @@ from data_io import (
     read_profile_images,
     write_profile_overlay,
 )
-from data_io.micrograph_levels import _border_width
-from data_io.micrograph_restore import restore
+from data_io.micrograph.levels import _border_width
+from data_io.micrograph.restore import restore
 from examples.micrograph import Camera, Edge, gaussian_edge, photograph
 from fitting import surface_statistics
 from pbrdf.errors import DataFileError

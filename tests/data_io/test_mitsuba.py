@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
 from data_io import export_mitsuba
-from data_io.mitsuba import HalfVectorGrid, _tabulate
+from data_io.reflectance.mitsuba import HalfVectorGrid, _tabulate
 from pbrdf import AccuracyWarning, Material, MicrofacetModel
 from pbrdf.optics.exchange import convert_brdf
 

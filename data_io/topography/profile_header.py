@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
-from data_io._text import Line, column_names, find_delimiter
-from data_io._units import (
+from data_io.text.text import Line, column_names, find_delimiter
+from data_io.text.units import (
     axis_units,
     column_unit,
     header_units,

@@ -8,9 +8,9 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import binary_erosion, label
 
-from data_io.micrograph_edges import Trace
-from data_io.micrograph_restore import Restored, restore
-from data_io.profile import Profile
+from data_io.micrograph.edges import Trace
+from data_io.micrograph.restore import Restored, restore
+from data_io.topography.profile import Profile
 
 # Columns less like a step than this are left out
 MIN_QUALITY = 0.4

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io._text import Line, Rows, column_names, read_numbers, split_header
-from data_io._units import (
+from data_io.text.text import Line, Rows, column_names, read_numbers, split_header
+from data_io.text.units import (
     LENGTH_UNITS,
     axis_units,
     column_unit,
@@ -16,7 +16,7 @@ from data_io._units import (
     unit_factor,
     warn_missing_unit,
 )
-from data_io.profile_header import column_axes
+from data_io.topography.profile_header import column_axes
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
 

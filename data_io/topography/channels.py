@@ -5,7 +5,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from data_io._units import LENGTH_UNITS, normalise_unit
+from data_io.text.units import LENGTH_UNITS, normalise_unit
 from pbrdf.errors import DataFileError
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage, optimize, special
 
-from data_io.micrograph_bodies import Body
+from data_io.micrograph.bodies import Body
 
 # Half-height of the window around an edge, in blurs; beyond lie 0.02 % of a Gaussian
 WINDOW_BLURS = 3.5

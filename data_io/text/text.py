@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from data_io._files import read_texts
-from data_io._notation import DECIMAL, plain_notation, unquoted
-from data_io._units import LENGTH_UNITS, normalise_unit
+from data_io.text.files import read_texts
+from data_io.text.notation import DECIMAL, plain_notation, unquoted
+from data_io.text.units import LENGTH_UNITS, normalise_unit
 from pbrdf.errors import DataFileError
 
 COMMENT_MARKS = ("#", "%")

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from data_io._files import ZIP_MAGIC, read_bytes
-from data_io._text import column_names, find_delimiter, read_numbers, split_header
-from data_io._write import complete_file
-from data_io.instruments import INSTRUMENT_SUFFIXES, read_instrument_profile
-from data_io.profile_header import column_axes, find_columns, find_factors
-from data_io.x3p import read_x3p
+from data_io.text.files import ZIP_MAGIC, read_bytes
+from data_io.text.text import column_names, find_delimiter, read_numbers, split_header
+from data_io.text.write import complete_file
+from data_io.topography.instruments import INSTRUMENT_SUFFIXES, read_instrument_profile
+from data_io.topography.profile_header import column_axes, find_columns, find_factors
+from data_io.topography.x3p import read_x3p
 from pbrdf.errors import DataFileError, require
 
 

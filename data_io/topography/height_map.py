@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io._files import read_bytes
-from data_io._units import unit_factor
-from data_io.height_text import Spacing, build_map, known_steps, read_text_map
-from data_io.instruments import read_instrument_map
-from data_io.x3p import read_x3p_map
+from data_io.text.files import read_bytes
+from data_io.text.units import unit_factor
+from data_io.topography.height_text import Spacing, build_map, known_steps, read_text_map
+from data_io.topography.instruments import read_instrument_map
+from data_io.topography.x3p import read_x3p_map
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
 

@@ -9,7 +9,7 @@ import struct
 import zlib
 from pathlib import Path
 
-from data_io._files import read_bytes
+from data_io.text.files import read_bytes
 
 _PLAIN, _COMPRESSED = b"DIGITAL SURF", b"DSCOMPRESSED"
 _HEADER = 512

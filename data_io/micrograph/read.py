@@ -6,13 +6,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from data_io import micrograph_bodies as bodies
-from data_io.micrograph_edges import picture_pixels, trace
-from data_io.micrograph_judgement import fault_of, refuse_other_pictures, two_levels
-from data_io.micrograph_levels import find_annotation_band, load_grey
-from data_io.micrograph_overlay import write_profile_overlay
-from data_io.micrograph_profile import EdgeProfile, edge_profile
-from data_io.micrograph_scale import pixel_size
+from data_io.micrograph import bodies
+from data_io.micrograph.edge_profile import EdgeProfile, edge_profile
+from data_io.micrograph.edges import picture_pixels, trace
+from data_io.micrograph.levels import find_annotation_band, load_grey
+from data_io.micrograph.overlay import write_profile_overlay
+from data_io.micrograph.refusals import fault_of, refuse_other_pictures, two_levels
+from data_io.micrograph.scale import pixel_size
 from pbrdf.errors import DataFileError, require
 
 __all__ = [

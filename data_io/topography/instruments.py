@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from data_io._files import NotAMapError
-from data_io._units import LENGTH_UNITS, normalise_unit, unit_factor
-from data_io.channels import choose_channel
-from data_io.sur import plain_sur
+from data_io.text.files import NotAMapError
+from data_io.text.units import LENGTH_UNITS, normalise_unit, unit_factor
+from data_io.topography.channels import choose_channel
+from data_io.topography.sur import plain_sur
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
 

@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from data_io._write import complete_file
-from data_io.brdf_source import Brdf, from_dataset, from_model
 from data_io.goniometer.frames import rotation
+from data_io.reflectance.brdf_source import Brdf, from_dataset, from_model
+from data_io.text.write import complete_file
 from pbrdf.analytic import MicrofacetModel
 from pbrdf.errors import require
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
-from data_io.micrograph_edges import Trace
-from data_io.micrograph_levels import Levels, flatten
-from data_io.micrograph_profile import MIN_QUALITY
+from data_io.micrograph.edge_profile import MIN_QUALITY
+from data_io.micrograph.edges import Trace
+from data_io.micrograph.levels import Levels, flatten
 from pbrdf.errors import DataFileError
 
 # A picture that two grey levels explain to less than this shows something else than an

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from data_io._files import read_bytes
-from data_io._write import complete_file
+from data_io.text.files import read_bytes
+from data_io.text.write import complete_file
 from pbrdf.errors import DataFileError
 
 # Marks an attribute that netCDF cannot hold as it is: truth values, None, lists, mappings

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from data_io._write import complete_file
+from data_io.text.write import complete_file
 from pbrdf.errors import DataFileError
 
 if TYPE_CHECKING:

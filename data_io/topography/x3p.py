@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from data_io._files import NotAMapError
+from data_io.text.files import NotAMapError
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
 

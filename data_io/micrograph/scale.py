@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from data_io.micrograph_levels import find_annotation_band
+from data_io.micrograph.levels import find_annotation_band
 from pbrdf.errors import DataFileError, require
 
 

@@ -1,0 +1,1 @@
+"""Micrographs: the edge of a surface, located to a fraction of a pixel."""

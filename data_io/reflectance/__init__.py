@@ -1,0 +1,1 @@
+"""Results, fitted models and tables of reflectance, written and read."""

@@ -1,0 +1,1 @@
+"""Text files as people write them: encodings, separators, numbers and units."""

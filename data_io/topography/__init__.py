@@ -1,0 +1,1 @@
+"""Profiles and height maps, from text files and from those of instruments."""
