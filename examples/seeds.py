@@ -13,7 +13,7 @@ from recovery import make_example, recovered
 
 from data_io import read_goniometer, read_profile_image
 from fitting.pipeline import run_pipeline
-from fitting.report import write_report
+from fitting.report.write import write_report
 from pbrdf import Material
 
 FIRST_SEED = 101

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 from fitting.fit import fit
 
 if TYPE_CHECKING:
-    from fitting.aperture import Aperture
-    from fitting.drop_silhouette import ContactAngle, contact_angle
+    from fitting.drops.silhouette import ContactAngle, contact_angle
     from fitting.estimate import Estimate
-    from fitting.likelihood import LikelihoodProfile, profile_likelihood
-    from fitting.model_comparison import Comparison, FTest, compare, f_test
-    from fitting.noise import Noise
-    from fitting.parameters import PARAMETERS
-    from fitting.result import FitResult
-    from fitting.simulated_model import SimulatedModel
-    from fitting.statistics import surface_statistics
-    from fitting.statistics_result import SurfaceStatistics
+    from fitting.models.simulated import SimulatedModel
+    from fitting.objective.parameters import PARAMETERS
+    from fitting.readings.aperture import Aperture
+    from fitting.readings.noise import Noise
+    from fitting.result.fit_result import FitResult
+    from fitting.result.likelihood import LikelihoodProfile, profile_likelihood
+    from fitting.result.model_comparison import Comparison, FTest, compare, f_test
+    from fitting.statistics.result import SurfaceStatistics
+    from fitting.statistics.surface import surface_statistics
 
 __all__ = [
     "PARAMETERS",
@@ -43,17 +43,17 @@ __all__ = [
 ]
 
 _MODULES = {
-    "aperture": ("Aperture",),
-    "drop_silhouette": ("ContactAngle", "contact_angle"),
+    "readings.aperture": ("Aperture",),
+    "drops.silhouette": ("ContactAngle", "contact_angle"),
     "estimate": ("Estimate",),
-    "likelihood": ("LikelihoodProfile", "profile_likelihood"),
-    "model_comparison": ("Comparison", "FTest", "compare", "f_test"),
-    "noise": ("Noise",),
-    "parameters": ("PARAMETERS",),
-    "result": ("FitResult",),
-    "simulated_model": ("SimulatedModel",),
-    "statistics": ("surface_statistics",),
-    "statistics_result": ("SurfaceStatistics",),
+    "result.likelihood": ("LikelihoodProfile", "profile_likelihood"),
+    "result.model_comparison": ("Comparison", "FTest", "compare", "f_test"),
+    "readings.noise": ("Noise",),
+    "objective.parameters": ("PARAMETERS",),
+    "result.fit_result": ("FitResult",),
+    "models.simulated": ("SimulatedModel",),
+    "statistics.surface": ("surface_statistics",),
+    "statistics.result": ("SurfaceStatistics",),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from fitting.aperture import Aperture
     from fitting.estimate import Estimate
-    from fitting.noise import Noise
-    from fitting.observations import Mask
-    from fitting.result import FitResult
+    from fitting.readings.aperture import Aperture
+    from fitting.readings.noise import Noise
+    from fitting.readings.observations import Mask
+    from fitting.result.fit_result import FitResult
 
 __all__ = ["fit"]
 
@@ -62,7 +62,7 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     use : sequence of str, optional
         Observables to use; default all.
     mask : callable or iterable of callables
-        What to leave out: see `fitting.masks`.
+        What to leave out: see `fitting.readings.masks`.
     noise : Noise, "relative", "absolute", optional
         Noise of the readings; default the file's columns, and where it has none, estimated
         from the misfit, relative to M00 or absolute, whichever is more likely.
@@ -107,9 +107,9 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     {'specular_gain': 0.9, 'diffuse_albedo': 0.1}
     """
     # Solvers and models load when something is fitted, not when `fitting` is imported
-    from fitting.assembly import Question, assemble
-    from fitting.problem import solve_likeliest
-    from fitting.report_fit import result_of
+    from fitting.problem.assembly import Question, assemble
+    from fitting.problem.problem import solve_likeliest
+    from fitting.result.make_result import result_of
 
     question = Question(
         free=tuple(free),

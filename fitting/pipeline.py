@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fitting.curves import plane_curves
 from fitting.fit import fit
-from fitting.observations import Mask
-from fitting.result import FitResult
-from fitting.simulated_model import SimulatedModel
-from fitting.statistics import surface_statistics
-from fitting.statistics_result import SurfaceStatistics
+from fitting.models.plane_curves import plane_curves
+from fitting.models.simulated import SimulatedModel
+from fitting.readings.observations import Mask
+from fitting.result.fit_result import FitResult
+from fitting.statistics.result import SurfaceStatistics
+from fitting.statistics.surface import surface_statistics
 from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
     form : str or int
         Form to remove from the surface, see `fitting.surface_statistics`.
     mask : sequence of callable
-        Readings to leave out, see `fitting.masks`.
+        Readings to leave out, see `fitting.readings.masks`.
     n_rays, realizations, seed, workers
         Of the Monte Carlo, see `pbrdf.simulate`.
     progress : callable, optional

@@ -12,8 +12,8 @@ from pbrdf.cli import options
 if TYPE_CHECKING:
     import xarray as xr
 
-    from fitting.result import FitResult
-    from fitting.simulated_model import SimulatedModel
+    from fitting.models.simulated import SimulatedModel
+    from fitting.result.fit_result import FitResult
     from pbrdf import MicrofacetModel
 
 
@@ -82,7 +82,7 @@ def fit(
         raise ValueError(msg)
 
     from fitting.fit import fit as fit_model
-    from fitting.masks import blocked_detector, zeros
+    from fitting.readings.masks import blocked_detector, zeros
 
     with progress_bar("tracing") as progress:
         model: MicrofacetModel | SimulatedModel
@@ -167,8 +167,8 @@ def _write(result: "FitResult", measured: "Mapping[str, xr.Dataset]", folder: Pa
     import numpy as np
 
     from data_io import in_plane, write_model
-    from fitting.curves import plane_curves
-    from fitting.figures import scan_figure
+    from fitting.models.plane_curves import plane_curves
+    from fitting.report.figures import scan_figure
 
     text = json.dumps(result.as_dict(), indent=2)
     (folder / "fit.json").write_text(f"{text}\n", encoding="utf-8")

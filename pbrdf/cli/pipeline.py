@@ -60,9 +60,9 @@ def pipeline(
         measurement = read_scan(scan, wavelength=wavelength)
         reading = perf_counter() - begin
 
-        from fitting.masks import blocked_detector, zeros
         from fitting.pipeline import run_pipeline
-        from fitting.report import write_report
+        from fitting.readings.masks import blocked_detector, zeros
+        from fitting.report.write import write_report
 
         bars = stack.enter_context(StageBars())
         result = run_pipeline(
@@ -98,7 +98,7 @@ def pipeline(
 
 def summary(result: "PipelineResult") -> Iterator[str]:
     """Yield what a reader at the terminal wants to know."""
-    from fitting.report import fit_columns
+    from fitting.report.write import fit_columns
 
     yield "Surface"
     for name, (estimate, unit) in result.statistics.estimates().items():

@@ -44,7 +44,7 @@ def plot(
     import numpy as np
 
     import data_io
-    from fitting.figures import hemisphere_figure, scan_figure
+    from fitting.report.figures import hemisphere_figure, scan_figure
     from pbrdf.cli.reading import read_scan
     from pbrdf.cli.staging import staged_file
 

@@ -91,7 +91,7 @@ def statistics(
         with staged_file(as_json, force=force) as stage:
             stage.write_text(json.dumps(found.to_dict(), indent=2) + "\n", encoding="utf-8")
     if figure is not None:
-        from fitting.figures import histogram_figure
+        from fitting.report.figures import histogram_figure
 
         with staged_file(figure, force=force) as stage:
             histograms = [found.height_histogram(), found.slope_histogram()]

@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from fitting import Noise, fit
-from fitting.uncertainty import information
+from fitting.objective.uncertainty import information
 from pbrdf import Material, MicrofacetModel
 
 GAINS = ("specular_gain", "diffuse_albedo")

@@ -17,7 +17,7 @@ import numpy as np
 
 from data_io import read_goniometer, read_height_map
 from fitting import Noise, fit, surface_statistics
-from fitting.analytic_model import AnalyticModel
+from fitting.models.analytic import AnalyticModel
 from pbrdf import Material, MicrofacetModel
 
 SHARED = Path(os.environ.get("PBRDF_SHARED", ".")) / "data"

@@ -11,8 +11,8 @@ from pathlib import Path
 import casadi
 import numpy as np
 
-from fitting.objective import Objective, Prediction
-from fitting.parameters import Parameter
+from fitting.objective.objective import Objective, Prediction
+from fitting.objective.parameters import Parameter
 
 FOLDER = Path(__file__).parent / "nist_strd"
 

@@ -10,7 +10,7 @@ from skimage import io
 
 from examples.drop_picture import DropPicture, draw, meridian
 from fitting import contact_angle
-from fitting.drop_shapes import fit_laplace, laplace_profile
+from fitting.drops.shapes import fit_laplace, laplace_profile
 from pbrdf.errors import DataFileError
 
 

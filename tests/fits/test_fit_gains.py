@@ -10,7 +10,7 @@ from scipy import optimize
 
 from fitting.estimate import Estimate
 from fitting.fit import fit
-from fitting.noise import Noise
+from fitting.readings.noise import Noise
 from pbrdf import Material, MicrofacetModel
 from tests.fits.scans import VINYL, scan
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fitting.casadi_solver import solve_casadi
-from fitting.nlopt_solver import solve_nlopt
-from fitting.uncertainty import information
+from fitting.objective.uncertainty import information
+from fitting.solvers.casadi_solver import solve_casadi
+from fitting.solvers.nlopt_solver import solve_nlopt
 from tests.fits import nist
 
 

@@ -13,11 +13,11 @@ from fitting import (
     fit,
     profile_likelihood,
 )
-from fitting.analytic_model import AnalyticModel
-from fitting.forward import Layout, predict
-from fitting.likelihood import allowed_rise
-from fitting.masks import blocked_detector, saturated, zeros
-from fitting.observations import observe
+from fitting.models.analytic import AnalyticModel
+from fitting.objective.forward import Layout, predict
+from fitting.readings.masks import blocked_detector, saturated, zeros
+from fitting.readings.observations import observe
+from fitting.result.likelihood import allowed_rise
 from pbrdf import Material, MicrofacetModel
 from tests.fits.scans import VINYL, scan
 

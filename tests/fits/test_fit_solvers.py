@@ -6,13 +6,13 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import optimize
 
-from fitting.casadi_solver import solve_casadi
-from fitting.global_search import SEARCHES, starts
-from fitting.losses import LOSSES
-from fitting.nlopt_solver import solve_nlopt
-from fitting.objective import Objective, Prediction
-from fitting.parameters import Parameter, bounded_parameter
-from fitting.uncertainty import information
+from fitting.objective.losses import LOSSES
+from fitting.objective.objective import Objective, Prediction
+from fitting.objective.parameters import Parameter, bounded_parameter
+from fitting.objective.uncertainty import information
+from fitting.solvers.casadi_solver import solve_casadi
+from fitting.solvers.global_search import SEARCHES, starts
+from fitting.solvers.nlopt_solver import solve_nlopt
 
 SOLVERS = [solve_casadi, solve_nlopt]
 

@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 
 from data_io import read_model, write_goniometer
 from fitting import SimulatedModel, fit
-from fitting.index_grid import IndexGrid
-from fitting.observations import Geometry
-from fitting.simulated_trace import interpolate_bins, merged
+from fitting.models.index_grid import IndexGrid
+from fitting.models.simulated_trace import interpolate_bins, merged
+from fitting.readings.observations import Geometry
 from pbrdf import GaussianSurface, HeightMap, Material, MicrofacetModel, Scene, simulate
 from pbrdf.cli import main
 from pbrdf.optics import specular_mueller

@@ -5,18 +5,24 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import integrate, special
 
-from fitting.statistics_form import form_degree, remove_form_map, remove_form_profile
-from fitting.statistics_gaussianity import judge_gaussianity
-from fitting.statistics_lags import line_sampling, profile_sampling
-from fitting.statistics_models import gaussian, matern, multi_scale, periodic, two_scale
-from fitting.statistics_quantisation import Rounding, find_step
-from fitting.statistics_spectrum import line_spectrum
-from fitting.statistics_variance import (
+from fitting.statistics.autocorrelation import (
+    gaussian,
+    matern,
+    multi_scale,
+    periodic,
+    two_scale,
+)
+from fitting.statistics.form import form_degree, remove_form_map, remove_form_profile
+from fitting.statistics.gaussianity import judge_gaussianity
+from fitting.statistics.rounding import Rounding, find_step
+from fitting.statistics.scatter import (
     Extent,
     form_losses,
     form_scatter,
     increment_covariance,
 )
+from fitting.statistics.spectrum import line_spectrum
+from fitting.statistics.structure_function import line_sampling, profile_sampling
 
 FORMS = [
     gaussian(3.7),

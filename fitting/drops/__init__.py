@@ -1,0 +1,1 @@
+"""Contact angles from the silhouettes of drops."""

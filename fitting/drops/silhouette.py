@@ -1,0 +1,249 @@
+"""Contact angles of a drop from its silhouette."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from data_io.micrograph.levels import load_grey
+from fitting.drops.contour import DropContour, find_drop
+from fitting.drops.shapes import ShapeFit, fit_arc, fit_laplace
+from fitting.estimate import Estimate
+from pbrdf.errors import DataFileError
+
+# Points nearer to the baseline are left out: the blurred corner rounds them. [blurs]
+CORNER_BLURS = 3.0
+# A side that Young-Laplace misses by more than this gets the local arc. [pixels]
+MAX_LAPLACE_RMS = 0.35
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactAngle:
+    """Contact angles of a sessile drop.
+
+    Parameters
+    ----------
+    left, right : Estimate
+        Angles through the liquid, with standard error and 95 % interval. [degrees]
+    baseline : ndarray, shape (2, 2)
+        Row and column of the left and the right contact point. [pixels]
+    lean : float
+        Counter-clockwise angle of the baseline with the rows. [degrees]
+    base_width, height : float
+        Of the drop, along the baseline and above it. [pixels]
+    bond_number : float
+        Gravity over surface tension from the shape; NaN if it did not follow Young-Laplace.
+    model : tuple of str
+        "laplace" or "arc": what was fitted on the left and on the right.
+    rms : tuple of float
+        Root mean square distance of the contour from each curve. [pixels]
+    blur : float
+        Standard deviation of the contour's blur. [pixels]
+    contour : ndarray, shape (n, 2)
+        Row and column of the drop's contour from left to right. [pixels]
+    warnings : tuple of str
+        What may matter to the angles.
+    """
+
+    left: Estimate
+    right: Estimate
+    baseline: np.ndarray
+    lean: float
+    base_width: float
+    height: float
+    bond_number: float
+    model: tuple[str, str]
+    rms: tuple[float, float]
+    blur: float
+    contour: np.ndarray
+    warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def mean(self) -> float:
+        """Mean of both sides. [degrees]"""
+        return (self.left.value + self.right.value) / 2
+
+
+def contact_angle(
+    image: str | Path | npt.ArrayLike,
+    *,
+    baseline: npt.ArrayLike | None = None,
+    crop: tuple[int, int, int, int] | None = None,
+) -> ContactAngle:
+    """Measure the contact angles of a back-lit drop on a flat substrate.
+
+    The contour is taken at the middle grey level. The baseline is the straight line that
+    most of the contour beside the drop lies on. Each side is fitted by the Young-Laplace
+    equation (apex, radius, Bond number and axis free, so the sides may differ) and, near
+    the contact only, by an arc with a tangent angle quadratic in its length. The first is
+    taken unless it misses the contour; the difference of both counts in the standard error,
+    with the scatter of the contour and with the baseline's height and lean.
+
+    Parameters
+    ----------
+    image : str, Path or array_like, shape (rows, columns[, 3])
+        Drop and substrate dark on bright ground.
+    baseline : array_like, shape (2, 2), optional
+        Row and column of two points of the baseline, if it is not in the silhouette.
+        [pixels]
+    crop : (top, bottom, left, right), optional
+        Part of the picture to use. [pixels]
+
+    Returns
+    -------
+    ContactAngle
+        Angles in degrees.
+
+    Raises
+    ------
+    DataFileError
+        If the file is no picture or shows no drop.
+    ValueError
+        If an array is no picture or shows no drop.
+    """
+    if isinstance(image, str | Path):
+        grey, name = load_grey(image)[0], image
+    else:
+        grey, name = _grey_array(image), "image"
+    rows, columns = grey.shape
+    top, bottom, left, right = crop or (0, rows, 0, columns)
+    if not (0 <= top < bottom <= rows and 0 <= left < right <= columns):
+        msg = (
+            f"crop must lie inside {rows} rows and {columns} columns, got {crop}. "
+            "Give (top, bottom, left, right) in pixels."
+        )
+        raise ValueError(msg)
+    origin = np.array([top, left])
+    given = None if baseline is None else np.asarray(baseline, dtype=float) - origin
+    drop = find_drop(grey[top:bottom, left:right], given)
+    if drop is None:
+        problem = "expected a dark drop on a dark straight substrate, found none"
+        cure = "Crop to the drop (crop=), or give two points of its baseline (baseline=)."
+        raise DataFileError(name, problem, cure)
+    return _fit_sides(drop, origin)
+
+
+def _grey_array(image: npt.ArrayLike) -> np.ndarray:
+    """Return grey levels in [0, 1] of an array."""
+    from skimage import color, util
+
+    array = np.asarray(image)
+    if array.ndim == 3 and array.shape[-1] in (3, 4):
+        array = color.rgb2gray(array[..., :3])
+    if array.ndim != 2 or min(array.shape) < 16:
+        msg = (
+            f"image must be a picture of at least 16 x 16 pixels, got shape {array.shape}. "
+            "Give a path, or an array of grey levels."
+        )
+        raise ValueError(msg)
+    if array.dtype.kind in "ui" or array.dtype == bool:
+        return util.img_as_float64(array)
+    if not np.isfinite(array).all() or np.ptp(array) == 0:
+        msg = "image must hold finite grey levels with contrast. Check how it was read."
+        raise ValueError(msg)
+    return (array - array.min()) / np.ptp(array)
+
+
+def _fit_sides(drop: DropContour, origin: np.ndarray) -> ContactAngle:
+    """Fit both sides and put the result together."""
+    clear = drop.points[drop.points[:, 1] > CORNER_BLURS * drop.blur + 1]
+    if len(clear) < 40:
+        msg = (
+            f"image shows a drop of only {len(clear)} clear contour points, 40 are needed. "
+            "Use a larger picture."
+        )
+        raise ValueError(msg)
+    whole = fit_laplace(_thin(clear))
+    apex = int(np.argmax(clear[:, 1]))
+    sides = [clear[: apex + 1] * [-1, 1], clear[apex:][::-1]]
+    results = [
+        _fit_side(side, whole, mirror) for side, mirror in zip(sides, (-1, 1), strict=True)
+    ]
+    remarks = []
+    estimates = []
+    for name, (fit, other, _) in zip(("left", "right"), results, strict=True):
+        error = np.sqrt(
+            fit.stderr**2
+            + _model_variance(fit, other)
+            + (fit.slope_by_height * drop.offset_stderr) ** 2
+            + drop.lean_stderr**2
+        )
+        degrees = float(np.rad2deg(fit.angle))
+        ends = [np.rad2deg(fit.centre + d * error) for d in (-1.96, 1.96)]
+        low, high = np.clip([min(ends[0], degrees), max(ends[1], degrees)], 0, 180)
+        stderr = float(np.rad2deg(np.hypot(error, fit.centre - fit.angle)))
+        estimates.append(Estimate(degrees, stderr, float(low), float(high)))
+        if abs(fit.angle - other.angle) > np.deg2rad(3):
+            remarks.append(
+                f"Young-Laplace fit and local arc differ on the {name} by "
+                f"{np.rad2deg(abs(fit.angle - other.angle)):.1f} degrees"
+            )
+    models = tuple(model for _, _, model in results)
+    if "arc" in models:
+        remarks.append(
+            "the contour is no axisymmetric drop under gravity (pinned, moving or uneven)"
+        )
+    cos, sin = np.cos(drop.lean), np.sin(drop.lean)
+    middle = drop.baseline.mean(axis=0)
+    start = drop.baseline[0] + origin
+    along = drop.points[:, 0] - drop.points[0, 0]
+    contour = np.stack(
+        [
+            start[0] - along * sin - drop.points[:, 1] * cos,
+            start[1] + along * cos - drop.points[:, 1] * sin,
+        ],
+        axis=1,
+    )
+    left, right = -results[0][0].contact, results[1][0].contact
+    mid_along = (drop.points[0, 0] + drop.points[-1, 0]) / 2
+    contacts = np.array(
+        [
+            [middle[0] - (a - mid_along) * sin, middle[1] + (a - mid_along) * cos]
+            for a in (left, right)
+        ]
+    )
+    return ContactAngle(
+        left=estimates[0],
+        right=estimates[1],
+        baseline=contacts + origin,
+        lean=float(np.rad2deg(drop.lean)),
+        base_width=float(right - left),
+        height=float(drop.points[:, 1].max()),
+        bond_number=whole.bond_number if "arc" not in models else float("nan"),
+        model=(models[0], models[1]),
+        rms=(results[0][0].rms, results[1][0].rms),
+        blur=drop.blur,
+        contour=contour,
+        warnings=tuple(remarks),
+    )
+
+
+def _model_variance(fit: ShapeFit, other: ShapeFit) -> float:
+    """Variance for the choice of the curve: both's difference beyond their scatter. [rad²]
+
+    A third of the difference counts as standard deviation. The arc rests on few points, so
+    most of a difference is its own scatter and says nothing about the curve that was taken.
+    """
+    scatter = fit.stderr**2 + other.stderr**2
+    return max((fit.angle - other.angle) ** 2 - scatter, 0.0) / 9
+
+
+def _fit_side(
+    points: np.ndarray, whole: ShapeFit, mirror: int
+) -> tuple[ShapeFit, ShapeFit, str]:
+    """Return the fit to trust for one side, the other one, and the name of the first."""
+    start = whole.parameters * np.array([mirror, 1, 1, 1])
+    laplace = fit_laplace(_thin(points), start)
+    arc_length = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    reach = max(0.4 * arc_length[-1], min(20.0, arc_length[-1]))
+    arc = fit_arc(_thin(points[arc_length <= reach]))
+    if laplace.rms <= max(MAX_LAPLACE_RMS, 1.5 * arc.rms):
+        return laplace, arc, "laplace"
+    return arc, laplace, "arc"
+
+
+def _thin(points: np.ndarray, most: int = 1200) -> np.ndarray[Any, Any]:
+    """Return at most so many points, evenly."""
+    return points[:: max(1, -(-len(points) // most))]

@@ -1,0 +1,1 @@
+"""What a fit minimises: parameters, losses and their uncertainty; knows no solver."""

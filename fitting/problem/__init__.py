@@ -1,0 +1,1 @@
+"""A measurement, a model and free parameters made into one problem."""

@@ -1,0 +1,203 @@
+"""The pipeline's results as files: figures, model.toml, result.nc and a report to read."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import xarray as xr
+
+import data_io
+from fitting.estimate import Estimate
+from fitting.report import html
+from fitting.report.figures import histogram_figure, scan_figure
+from pbrdf import __version__
+
+if TYPE_CHECKING:
+    from fitting.pipeline import PipelineResult
+    from fitting.result.fit_result import FitResult
+
+__all__ = ["fit_columns", "result_dataset", "write_report"]
+
+
+def write_report(
+    result: "PipelineResult",
+    folder: Path,
+    *,
+    inputs: Mapping[str, str] | None = None,
+    seconds: Mapping[str, float] | None = None,
+) -> None:
+    """Write model.toml, result.nc, the figures and report.html into a folder.
+
+    Parameters
+    ----------
+    result : PipelineResult
+        What to write.
+    folder : Path
+        An existing folder.
+    inputs : mapping of str to str, optional
+        What went in, for the report: surface, scan, index.
+    seconds : mapping of str to float, optional
+        Time of what came before the pipeline. [s]
+    """
+    figures = {
+        "surface.png": html.png(histogram_figure(_histograms(result))),
+        "scan.png": html.png(
+            scan_figure(data_io.in_plane(result.measurement), result.curves)
+        ),
+    }
+    for name, image in figures.items():
+        (folder / name).write_bytes(image)
+    data_io.write_result(result_dataset(result), folder / "result.nc")
+    data_io.write_model(result.model, folder / "model.toml", notes=_notes(result))
+    times = {**(seconds or {}), **result.seconds}
+    page = html.page("Reflectance model", _sections(result, figures, inputs or {}, times))
+    (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+def result_dataset(result: "PipelineResult") -> xr.Dataset:
+    """Return simulation, curves and scan as one dataset, the fits as its attributes."""
+    scan = result.measurement
+    angles = {name: f"scan_{name}" for name in scan.coords}
+    measured = scan.rename({**angles, **{name: f"scan_{name}" for name in scan.data_vars}})
+    together = xr.merge(
+        [result.simulation, result.curves, measured.reset_coords()],
+        combine_attrs="drop",
+        compat="no_conflicts",
+        join="outer",
+    )
+    together.attrs = {
+        **result.simulation.attrs,
+        "statistics": result.statistics.to_dict(),
+        "analytic_fit": result.analytic.as_dict(),
+        "monte_carlo_fit": result.monte_carlo.as_dict(),
+    }
+    return together
+
+
+def _estimate_rows(fits: "Mapping[str, FitResult]") -> Iterator[tuple[str, ...]]:
+    """Yield (parameter, then value with interval in each fit) for a table."""
+    names = dict.fromkeys(name for fit in fits.values() for name in fit.values)
+    for name in names:
+        yield (name, *(str(fit.estimates.get(name, "held")) for fit in fits.values()))
+
+
+def fit_columns(result: "PipelineResult") -> "dict[str, FitResult]":
+    """Return the fits under the titles that report and terminal give them."""
+    held = "slope_rms" not in result.analytic.values
+    slope = "slope of the surface" if held else "slope fitted"
+    fits = {
+        f"Analytical, {slope}": result.analytic,
+        f"Monte Carlo, {slope}": result.monte_carlo,
+    }
+    if result.scan_slope is not None:
+        fits["Monte Carlo, slope from the scan alone"] = result.scan_slope
+    return fits
+
+
+def _histograms(result: "PipelineResult") -> list:
+    statistics = result.statistics
+    return [statistics.height_histogram(), statistics.slope_histogram()]
+
+
+def _notes(result: "PipelineResult") -> dict[str, object]:
+    """Return what model.toml remembers beside the model."""
+    return {
+        "uncertainty": {
+            name: _plain(estimate) for name, estimate in result.analytic.estimates.items()
+        }
+        | {"slope_rms": _plain(result.statistics.slope_rms)},
+        "monte_carlo": {
+            name: _plain(estimate)
+            for name, estimate in result.monte_carlo.estimates.items()
+        },
+        "surface": {
+            name: _plain(estimate) | {"unit": unit}
+            for name, (estimate, unit) in result.statistics.estimates().items()
+        },
+        "made_by": {"program": f"pbrdf {__version__}"},
+    }
+
+
+def _plain(estimate: Estimate) -> dict[str, object]:
+    return dict(estimate.as_dict())
+
+
+def _sections(
+    result: "PipelineResult",
+    figures: Mapping[str, bytes],
+    inputs: Mapping[str, str],
+    seconds: Mapping[str, float],
+) -> Iterator[str]:
+    statistics, fits = result.statistics, fit_columns(result)
+    yield html.section("What went in", html.table(("", ""), inputs.items()))
+    yield html.section(
+        "Surface",
+        html.table(
+            ("quantity", "unit", "value", "standard error", "95 % from", "to"),
+            statistics.table(),
+        ),
+        html.paragraph(
+            f"Autocorrelation: {statistics.autocorrelation.description}. "
+            f"Heights: {statistics.gaussianity.verdict}."
+        ),
+        html.bullets(statistics.warnings),
+        html.figure(
+            figures["surface.png"], "Heights and slopes, and Gaussians of their rms."
+        ),
+    )
+    yield html.section(
+        "Model",
+        html.table(("parameter", *fits), _estimate_rows(fits)),
+        html.paragraph(
+            "Value ± standard error and 95 % interval. The errors include the noise of the "
+            "scan and, where the slope is held at that of the surface, its uncertainty."
+        ),
+        html.table(
+            ("misfit", *fits),
+            [
+                ("chi2 / dof", *(_quality(fit) for fit in fits.values())),
+                ("noise of the scan", *(fit.noise for fit in fits.values())),
+                *_misfit_rows(fits),
+            ],
+        ),
+        html.figure(
+            figures["scan.png"],
+            "Scan, analytical curve (dashed) and Monte Carlo with all bounces (full, band: "
+            "95 %). Below: what the scan shows beyond each curve.",
+        ),
+    )
+    yield html.section("What these data cannot tell", html.bullets(result.unknown))
+    yield html.section(
+        "Simulation",
+        html.table(
+            ("", ""), [(name, str(result.simulation.attrs[name])) for name in _SHOWN]
+        ),
+    )
+    yield html.section(
+        "Time",
+        html.table(
+            ("stage", "seconds"),
+            [(stage, f"{elapsed:.1f}") for stage, elapsed in seconds.items()],
+        ),
+    )
+
+
+_SHOWN = ("n_rays", "realizations", "seed", "max_bounces", "version")
+
+
+def _quality(fit: "FitResult") -> str:
+    if fit.n_estimated:
+        return "1 by construction: the noise was estimated from the misfit"
+    return f"{fit.chi2 / fit.dof:.3g} ({fit.dof} degrees of freedom, p = {fit.p_value:.2g})"
+
+
+def _misfit_rows(fits: "Mapping[str, FitResult]") -> Iterator[tuple[str, ...]]:
+    """Yield the rms misfit of each observable, as a share of the rms reading."""
+    first = next(iter(fits.values()))
+    for name in dict.fromkeys(first.readings.observable.values.tolist()):
+        row = [f"rms misfit of {name}, over rms {name}"]
+        for fit in fits.values():
+            here = fit.readings.isel(reading=fit.readings.observable.values == name)
+            share = ((here.measured - here.model) ** 2).sum() / (here.measured**2).sum()
+            row.append(f"{100 * float(share) ** 0.5:.2g} %")
+        yield tuple(row)

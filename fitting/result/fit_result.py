@@ -1,0 +1,259 @@
+"""What a fit found, how well, and what it could not find."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import stats
+
+from fitting.estimate import Estimate
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from fitting.objective.parameters import Parameter
+    from fitting.problem.problem import Problem
+    from fitting.result.likelihood import LikelihoodProfile
+
+__all__ = ["HARDLY_APART", "FitResult"]
+
+# Correlation from which two parameters can hardly be told apart
+HARDLY_APART = 0.95
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FitResult:
+    """Parameters with their uncertainty, and the misfit that is left.
+
+    Parameters
+    ----------
+    values, stderr : mapping of str to float
+        Best values and standard errors by parameter name; a parameter that is separate for
+        each scan appears as `name[scan]`. The standard error is inf where the data do not
+        determine the parameter and nan where there is no minimum. Of a kappa at 0 it is the
+        root of the standard error of its square, which is all that the data see.
+    covariance, correlation : ndarray, shape (n, n)
+        In the order of `values`, uncertainty of fixed parameters included.
+    residuals : ndarray, shape (m,)
+        (measured - model) / standard error; their squares sum to `chi2`.
+    chi2 : float
+        Sum of squared residuals. Where the noise is estimated it equals `dof` by
+        construction and says nothing about the fit.
+    dof : int
+        Readings minus free parameters.
+    solver, status : str
+        Who stopped, and why.
+    converged : bool
+        True if `status` is a minimum.
+    n_evaluations : int
+        How often the cost was computed.
+    warnings : tuple of str
+        What a reader must know before using a number.
+    model : object
+        The model with the fitted values: where a parameter is separate, those of the first
+        group.
+    models : mapping of str to object
+        The model of each scan.
+    noise : str
+        Where the standard errors of the readings come from.
+    log_likelihood : float
+        Gaussian, at the minimum.
+    n_estimated : int
+        Parameters of the noise that were estimated beside the free ones.
+    stderr_parts : mapping of str to mapping
+        Standard error of each parameter by source: "noise", "simulation" where there is
+        one in the model, and each uncertain fixed parameter.
+    problem : Problem
+        What was solved, to be solved again with changes.
+    """
+
+    values: Mapping[str, float]
+    stderr: Mapping[str, float]
+    covariance: np.ndarray
+    correlation: np.ndarray
+    residuals: np.ndarray
+    chi2: float
+    dof: int
+    solver: str
+    status: str
+    converged: bool
+    n_evaluations: int
+    warnings: tuple[str, ...]
+    model: Any
+    models: Mapping[str, Any]
+    noise: str
+    log_likelihood: float
+    n_estimated: int
+    stderr_parts: Mapping[str, Mapping[str, float]]
+    problem: "Problem" = field(repr=False)
+
+    @cached_property
+    def readings(self) -> "xr.Dataset":
+        """Every reading beside its fitted value, stderr and geometry, dim `reading`."""
+        import xarray as xr
+
+        observations, objective = self.problem.observations, self.problem.objective
+        geometry, at = observations.geometry, observations.at
+        columns = {
+            "measured": objective.data,
+            "model": objective.predict(np.array(list(self.values.values()))),
+            "stderr": objective.stderr,
+            "residual": self.residuals,
+        }
+        coords = {
+            "observable": observations.name,
+            "scan": np.array(observations.labels)[observations.scan[at]],
+            "theta_i": geometry.theta_i[at],
+            "theta_s": geometry.theta_s[at],
+            "dphi": geometry.dphi[at],
+            "theta_view": geometry.theta_view[at],
+            "wavelength": geometry.wavelength[at],
+        }
+        return xr.Dataset(
+            {name: ("reading", value) for name, value in columns.items()},
+            coords={name: ("reading", value) for name, value in coords.items()},
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The free parameters, in the order of the matrices."""
+        return tuple(self.values)
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """Each parameter as value, standard error and 95 % interval.
+
+        The interval is symmetric, or where a bound is within reach that of `profiles`.
+        """
+        found = {}
+        for name, value in self.values.items():
+            stderr = self.stderr[name]
+            half = self.quantile(0.95) * stderr
+            low, high = value - half, value + half
+            if name in self.profiles:
+                low, high = self.profiles[name].low, self.profiles[name].high
+            found[name] = Estimate(value, stderr, low, high)
+        return found
+
+    @cached_property
+    def profiles(self) -> "dict[str, LikelihoodProfile]":
+        """Likelihood intervals of the parameters that a bound cuts off, by name.
+
+        And of those that can hardly be told apart from one of them: the bound limits both.
+        """
+        from fitting.result.likelihood import profile_likelihood
+
+        if not self.converged:
+            return {}
+        parameters = self.problem.objective.parameters
+        cut = np.array([self._near_bound(parameter) for parameter in parameters])
+        # nan, for undetermined ones, compares false
+        tied = (np.abs(self.correlation[:, cut]) > HARDLY_APART).any(axis=1)
+        return {
+            name: profile_likelihood(self, name)
+            for name, profiled in zip(self.names, cut | tied, strict=True)
+            if profiled
+        }
+
+    def _near_bound(self, parameter: "Parameter") -> bool:
+        """Tell whether an end of the symmetric interval would not be inside the bounds."""
+        value, stderr = self.values[parameter.name], self.stderr[parameter.name]
+        if not np.isfinite(stderr) or parameter.low == parameter.high:
+            return False
+        room = min(value - parameter.low, parameter.high - value)
+        # What acts by its square is lopsided from further off
+        return bool(
+            room < (2.0 if parameter.squared else 1.0) * self.quantile(0.95) * stderr
+        )
+
+    def quantile(self, level: float) -> float:
+        """Return the half width of a `level` interval in standard errors.
+
+        Student's t where the noise was estimated, else the normal distribution.
+        """
+        tail = 0.5 + level / 2.0
+        if self.n_estimated and self.dof > 0:
+            return float(stats.t.ppf(tail, self.dof))
+        return float(stats.norm.ppf(tail))
+
+    @property
+    def p_value(self) -> float:
+        """Chance of a chi2 this high if the model is right; nan if it was made to fit."""
+        if self.n_estimated or self.dof <= 0:
+            return np.nan
+        return float(stats.chi2.sf(self.chi2, self.dof))
+
+    @property
+    def aic(self) -> float:
+        """Akaike's information criterion with the correction for few readings."""
+        k, m = len(self.values) + self.n_estimated, len(self.residuals)
+        correction = 2.0 * k * (k + 1) / (m - k - 1) if m > k + 1 else np.inf
+        return 2.0 * k - 2.0 * self.log_likelihood + correction
+
+    @property
+    def bic(self) -> float:
+        """Schwarz's information criterion."""
+        k, m = len(self.values) + self.n_estimated, len(self.residuals)
+        return k * np.log(m) - 2.0 * self.log_likelihood
+
+    def summary(self) -> str:
+        """Return the result as a few lines of text."""
+        width = max(len(name) for name in self.values)
+        lines = [f"{self.status} ({self.solver}, {self.n_evaluations} evaluations)"]
+        for name, value in self.values.items():
+            text = _pair(value, self.stderr[name])
+            if name in self.profiles:
+                interval = self.profiles[name].interval
+                text = f"{value:.4g} ± {self.stderr[name]:.2g} ({interval})"
+            lines.append(f"  {name:<{width}} = {text}")
+        quality = "made to fit" if self.n_estimated else f"p = {self.p_value:.2g}"
+        lines.append(f"  chi2 / dof = {self.chi2:.4g} / {self.dof} ({quality})")
+        lines.append(f"  noise: {self.noise}")
+        lines += [f"  warning: {warning}" for warning in self.warnings]
+        return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the numbers for a JSON file; nan and inf become null."""
+        matrix = self.correlation.tolist()
+        return {
+            "status": self.status,
+            "converged": self.converged,
+            "solver": self.solver,
+            "n_evaluations": self.n_evaluations,
+            "parameters": {
+                name: {
+                    **{key: _number(v) for key, v in estimate.as_dict().items()},
+                    "low_open": name in self.profiles and self.profiles[name].low_open,
+                    "high_open": name in self.profiles and self.profiles[name].high_open,
+                }
+                for name, estimate in self.estimates.items()
+            },
+            "stderr_parts": {
+                name: {source: _number(part) for source, part in parts.items()}
+                for name, parts in self.stderr_parts.items()
+            },
+            "correlation": [[_number(entry) for entry in row] for row in matrix],
+            "chi2": _number(self.chi2),
+            "dof": self.dof,
+            "p_value": _number(self.p_value),
+            "aic": _number(self.aic),
+            "bic": _number(self.bic),
+            "noise": self.noise,
+            "warnings": list(self.warnings),
+        }
+
+
+def _pair(value: float, stderr: float) -> str:
+    """Write value and standard error to two digits of the latter."""
+    if np.isinf(stderr):
+        return f"{value:.4g} (not determined)"
+    if not np.isfinite(stderr) or stderr <= 0.0:
+        return f"{value:.6g}"
+    decimals = int(np.clip(1 - np.floor(np.log10(stderr)), 0, 12))
+    return f"{value:.{decimals}f} ± {stderr:.{decimals}f}"
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

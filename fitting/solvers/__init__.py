@@ -1,0 +1,1 @@
+"""Solvers: they know an objective and no physics."""

@@ -1,0 +1,231 @@
+"""Surface statistics that can be trusted: noise, rounding and finite length corrected."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Protocol, TypeGuard
+
+import numpy as np
+
+from fitting.statistics.assembly import assemble
+from fitting.statistics.autocorrelation import GAUSSIAN
+from fitting.statistics.axis import axis_statistics
+from fitting.statistics.axis_fit import AxisData
+from fitting.statistics.axis_problem import fit_axis
+from fitting.statistics.form import (
+    FORMS,
+    Form,
+    form_degree,
+    remove_form_map,
+    remove_form_profile,
+)
+from fitting.statistics.result import SurfaceStatistics
+from fitting.statistics.rounding import find_step, is_negligible
+from fitting.statistics.scatter import form_losses, mean_power_of_correlation
+from fitting.statistics.structure_function import Sampling, line_sampling, profile_sampling
+
+Array = np.ndarray
+
+_FEWEST_POINTS = 12
+
+
+class ProfileLike(Protocol):
+    """Positions x, rising, and heights z. [um]"""
+
+    @property
+    def x(self) -> Array: ...  # noqa: D102
+    @property
+    def z(self) -> Array: ...  # noqa: D102
+
+
+class MapLike(Protocol):
+    """Heights (nx, ny), NaN where missing, and spacing (dx, dy). [um]"""
+
+    @property
+    def heights(self) -> Array: ...  # noqa: D102
+    @property
+    def spacing(self) -> tuple[float, float]: ...  # noqa: D102
+
+
+def surface_statistics(
+    surface: ProfileLike | MapLike,
+    *,
+    form: str | int = "tilt",
+    quantisation: float | None = None,
+) -> SurfaceStatistics:
+    """Height, length, slope and noise of a measured surface, each with its uncertainty.
+
+    Parameters
+    ----------
+    surface : Profile or HeightMap
+        Profile with x, z, evenly spaced or not; or map with heights (nx, ny), NaN where
+        missing, and spacing. [um]
+    form : str or int
+        What to remove first: ``none``, ``mean``, ``tilt``, ``curvature`` or the degree of a
+        polynomial. What it takes from the roughness is made good.
+    quantisation : float, optional
+        Step of the lattice that heights were rounded to, such as the pixel of an image
+        whose edge was found to whole pixels. [um] Found from the heights by default; 0 for
+        none.
+
+    Returns
+    -------
+    SurfaceStatistics
+
+    Raises
+    ------
+    TypeError
+        If `surface` is neither.
+    ValueError
+        If it has too few heights, does not vary, or `form` is unknown.
+
+    Notes
+    -----
+    The structure function D(r) = ⟨(z(x + r) - z(x))²⟩ up to 1.5 correlation lengths and the
+    mean square height are fitted together by a model autocorrelation, white noise and the
+    closed-form effect of rounding (see `fitting.statistics.rounding`), weighted by
+    their theoretical covariance. That covariance, which counts independent correlation
+    lengths, gives the intervals. A Gaussian autocorrelation is kept unless the data reject
+    it for a Matérn form or two scales.
+
+    Of a profile with an attribute `located`, such as `data_io.EdgeProfile`, that is taken,
+    with its blur and its noise: the model is blurred likewise before it is compared, and
+    the noise, of known autocorrelation, is found with it. A restored edge would not do:
+    what is left of its noise is amplified, band-limited and decided by the noise itself.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> rng = np.random.default_rng(3)
+    >>> x = np.arange(2000.0)
+    >>> kernel = np.exp(-2 * (np.arange(-60, 61) / 15) ** 2)
+    >>> z = np.convolve(rng.normal(size=2120), kernel, "valid")[:2000]
+    >>> profile = SimpleNamespace(x=x, z=z + rng.normal(scale=0.3, size=2000))
+    >>> found = surface_statistics(profile)
+    >>> found.corr_length.low < 15 < found.corr_length.high
+    True
+    """
+    degree = form_degree(form)
+    if _is_map(surface):
+        return _map_statistics(surface, degree, _form_name(degree), quantisation)
+    if _is_profile(surface):
+        return _profile_statistics(surface, degree, _form_name(degree), quantisation)
+    msg = (
+        f"surface must be a Profile (x, z) or a HeightMap (heights, spacing), "
+        f"got {type(surface).__name__}. See data_io.read_profile and read_height_map."
+    )
+    raise TypeError(msg)
+
+
+def _profile_statistics(
+    profile: ProfileLike, degree: int, form: str, quantisation: float | None
+) -> SurfaceStatistics:
+    located = getattr(profile, "located", None)
+    if located is not None:
+        profile = located
+    x, z = np.asarray(profile.x, dtype=float), np.asarray(profile.z, dtype=float)
+    known = ~np.isnan(z)
+    x, z = x[known], z[known]
+    _check_heights(z, degree)
+    residual, removed = remove_form_profile(x, z, degree)
+    sampling = profile_sampling(x, residual)
+    step = _step(z, quantisation, sampling)
+    starts = np.linspace(x[0], x[-1], 65)[:-1, None]
+
+    def form_increments(lags: Array) -> Array:
+        begin = np.minimum(starts, x[-1] - lags)
+        return removed.along(0, begin + lags) - removed.along(0, begin)
+
+    data = AxisData(sampling, step, form_increments, degree, removed.n_terms)
+    if located is not None:
+        data = replace(data, blur=located.blur, grain=located.grain)
+    along = axis_statistics("x", data, 1.0, None)
+    return assemble(
+        "profile", (along,), residual, (sampling.spacing,), form=form, step=step
+    )
+
+
+def _map_statistics(
+    surface: MapLike, degree: int, form: str, quantisation: float | None
+) -> SurfaceStatistics:
+    heights = np.asarray(surface.heights, dtype=float)
+    dx, dy = np.broadcast_to(np.asarray(surface.spacing, dtype=float), (2,))
+    spacing = (float(dx), float(dy))
+    _check_heights(heights[~np.isnan(heights)], degree)
+    residual, removed = remove_form_map(heights, spacing, degree)
+    lines = (residual.T, residual)
+    samplings = [line_sampling(lines[i], spacing[i]) for i in (0, 1)]
+    step = _step(heights, quantisation, samplings[0])
+    data = [
+        AxisData(samplings[i], step, _map_increments(removed, i), degree, removed.n_terms)
+        for i in (0, 1)
+    ]
+    # Each axis needs the other's correlation length to count independent lines
+    first = [fit_axis(d, across=0.1, families=(GAUSSIAN,)) for d in data]
+    axes = []
+    for i, name in enumerate("xy"):
+        other, length = first[1 - i].correlation, samplings[1 - i].length
+        across = mean_power_of_correlation(other, length, 2)
+        losses = form_losses(other, length, degree)
+        axes.append(axis_statistics(name, data[i], across, losses))
+    return assemble("map", tuple(axes), residual, spacing, form=form, step=step)
+
+
+def _map_increments(removed: Form, axis: int) -> Callable[[Array], Array]:
+    """Increments of the removed form along an axis, over an 8 x 8 lattice of starts."""
+    low, high = removed.ranges[axis]
+    starts = np.repeat(np.linspace(low, high, 8), 8)[:, None]
+    across = np.tile(np.linspace(*removed.ranges[1 - axis], 8), 8)[:, None]
+
+    def increments(lags: Array) -> Array:
+        begin = np.minimum(starts, high - lags)
+        side = np.broadcast_to(across, begin.shape)
+        return removed.along(axis, begin + lags, side) - removed.along(axis, begin, side)
+
+    return increments
+
+
+def _step(heights: Array, quantisation: float | None, sampling: Sampling) -> float:
+    if quantisation is None:
+        step = find_step(heights)
+    elif np.isfinite(quantisation) and quantisation >= 0:
+        step = float(quantisation)
+    else:
+        msg = (
+            f"quantisation must be >= 0 [um], got {quantisation}. Give the step between "
+            "height levels, 0 for none, or leave it out to have it found."
+        )
+        raise ValueError(msg)
+    first = float(sampling.increments(0.0, 6).mean_square[0])
+    return 0.0 if is_negligible(step, first) else step
+
+
+def _check_heights(heights: Array, degree: int) -> None:
+    fewest = max(_FEWEST_POINTS, 3 * (degree + 1))
+    if heights.size < fewest:
+        msg = (
+            f"surface must have at least {fewest} heights, got {heights.size}. "
+            "Measure a longer profile."
+        )
+        raise ValueError(msg)
+    if np.isinf(heights).any():
+        msg = "heights must be finite [um], got inf. Mark missing points with NaN."
+        raise ValueError(msg)
+    if np.ptp(heights) == 0:
+        msg = (
+            f"heights must vary, got {heights.flat[0]:.9g} um everywhere. "
+            "A perfectly flat surface has no statistics; use HeightMap.flat."
+        )
+        raise ValueError(msg)
+
+
+def _form_name(degree: int) -> str:
+    names = {value: name for name, value in FORMS.items()}
+    return names.get(degree, f"polynomial of degree {degree}")
+
+
+def _is_map(surface: object) -> TypeGuard[MapLike]:
+    return hasattr(surface, "heights") and hasattr(surface, "spacing")
+
+
+def _is_profile(surface: object) -> TypeGuard[ProfileLike]:
+    return hasattr(surface, "x") and hasattr(surface, "z")
