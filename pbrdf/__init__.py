@@ -6,25 +6,19 @@ Public names load on first use: importing the package does no work.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from pbrdf._version import __version__ as __version__
+
 if TYPE_CHECKING:
     from pbrdf import materials
     from pbrdf.analytic import MicrofacetModel
+    from pbrdf.contaminants import Drops, Film, Spheres
     from pbrdf.errors import AccuracyWarning, DataFileError
-    from pbrdf.observation import observe
+    from pbrdf.observation.run import observe
     from pbrdf.optics.materials import Material
-    from pbrdf.scene import Scene
-    from pbrdf.scene_file import load_scene
-    from pbrdf.simulation import simulate
-    from pbrdf.surface import (
-        Drops,
-        Film,
-        GaussianSurface,
-        HeightMap,
-        MeasuredSurface,
-        Spheres,
-    )
-
-__version__ = "0.1.0"
+    from pbrdf.scene.read import load_scene
+    from pbrdf.scene.scene import Scene
+    from pbrdf.simulation.run import simulate
+    from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
 
 __all__ = [
     "AccuracyWarning",
@@ -47,18 +41,18 @@ __all__ = [
 _HOME = {
     "AccuracyWarning": "pbrdf.errors",
     "DataFileError": "pbrdf.errors",
-    "Drops": "pbrdf.surface",
-    "Film": "pbrdf.surface",
+    "Drops": "pbrdf.contaminants",
+    "Film": "pbrdf.contaminants",
     "GaussianSurface": "pbrdf.surface",
     "HeightMap": "pbrdf.surface",
     "Material": "pbrdf.optics.materials",
     "MeasuredSurface": "pbrdf.surface",
     "MicrofacetModel": "pbrdf.analytic",
-    "Scene": "pbrdf.scene",
-    "Spheres": "pbrdf.surface",
-    "load_scene": "pbrdf.scene_file",
-    "observe": "pbrdf.observation",
-    "simulate": "pbrdf.simulation",
+    "Scene": "pbrdf.scene.scene",
+    "Spheres": "pbrdf.contaminants",
+    "load_scene": "pbrdf.scene.read",
+    "observe": "pbrdf.observation.run",
+    "simulate": "pbrdf.simulation.run",
 }
 
 

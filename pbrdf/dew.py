@@ -8,12 +8,13 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from pbrdf.contaminants import Drops
 from pbrdf.conventions import direction
 from pbrdf.errors import AccuracyWarning
 from pbrdf.optics.materials import Material
-from pbrdf.scene import Scene, Surface
-from pbrdf.simulation import simulate
-from pbrdf.surface import Drops
+from pbrdf.scene.scene import Scene
+from pbrdf.simulation.run import simulate
+from pbrdf.surface import Surface
 
 DRY = "dry"
 # Directions this near to the specular one are its lobe, up to the second angle its skirt;

@@ -4,9 +4,9 @@
                        + specular_gain * light of several bounces(n, kappa),
 
 where the ratio, for each direction, and the light of several bounces come from one Monte
-Carlo run (`fitting.models.simulated_trace`). Nothing is traced again while the solver varies
-n, kappa and gains. The slope may vary too, near the one traced: the analytical curve follows
-it, the correction stays.
+Carlo run (`fitting.models.simulated_trace`). Nothing is traced again while the solver
+varies n, kappa and gains. The slope may vary too, near the one traced: the analytical curve
+follows it, the correction stays.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -5,7 +5,7 @@ import numpy.typing as npt
 
 from pbrdf.analytic.geometry import flat_geometry
 from pbrdf.analytic.microfacet import MicrofacetModel
-from pbrdf.kernels.bounces import fill_second_bounce
+from pbrdf.kernels.microfacet.second_bounce import fill_second_bounce
 
 __all__ = ["second_bounce"]
 

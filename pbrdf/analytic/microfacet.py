@@ -19,10 +19,10 @@ from pbrdf.analytic.tables import (
     code_of,
 )
 from pbrdf.errors import require
-from pbrdf.kernels import microfacet as kernel
-from pbrdf.kernels.shadowing import Shadowing
-from pbrdf.kernels.slopes import GAUSSIAN, Roughness, slope_norm
-from pbrdf.kernels.volume import Diffuse
+from pbrdf.kernels.microfacet import microfacet as kernel
+from pbrdf.kernels.microfacet.shadowing import Shadowing
+from pbrdf.kernels.microfacet.slopes import GAUSSIAN, Roughness, slope_norm
+from pbrdf.kernels.optics.volume import Diffuse
 from pbrdf.optics import library
 from pbrdf.optics.materials import Material
 

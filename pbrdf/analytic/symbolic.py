@@ -16,8 +16,9 @@ from pbrdf.analytic.tables import (
     VOLUME_FORMS,
     code_of,
 )
-from pbrdf.kernels import facet, microfacet, slopes, volume
-from pbrdf.kernels.shadowing import Shadowing
+from pbrdf.kernels.microfacet import facet, microfacet, slopes
+from pbrdf.kernels.microfacet.shadowing import Shadowing
+from pbrdf.kernels.optics import volume
 
 __all__ = ["brdf_expression", "rebind"]
 
@@ -36,7 +37,7 @@ def rebind(
 
     Examples
     --------
-    >>> from pbrdf.kernels.fresnel import wave_normal
+    >>> from pbrdf.kernels.optics.fresnel import wave_normal
     >>> shown = rebind(wave_normal, {"sqrt": lambda x: 2.0, "select": lambda c, a, b: a})
     >>> shown(0.5, 1.5, 0.0)
     (2.0, 0.0)

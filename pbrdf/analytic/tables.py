@@ -5,7 +5,8 @@ The two tables are what `MicrofacetModel` accepts and what the documentation pri
 
 from dataclasses import dataclass
 
-from pbrdf.kernels import shadowing, slopes, volume
+from pbrdf.kernels.microfacet import shadowing, slopes
+from pbrdf.kernels.optics import volume
 
 __all__ = [
     "GRAZING_FORMS",

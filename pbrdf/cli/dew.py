@@ -88,7 +88,7 @@ def dew(
 
     if scene is None:
         # A patch of a millimetre with facets of a fifteenth of the length
-        surface: pbrdf.scene.Surface = pbrdf.GaussianSurface(
+        surface: pbrdf.scene.scene.Surface = pbrdf.GaussianSurface(
             shape=(512, 512), spacing=2.0, corr_length=30.0, slope_rms=slope_rms
         )
         substrate = pbrdf.Material(n, diffuse_albedo=diffuse_albedo)

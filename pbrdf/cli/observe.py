@@ -108,7 +108,7 @@ def observe(
     from data_io import write_goniometer, write_result
     from pbrdf.cli.progress import progress_bar
     from pbrdf.cli.staging import staged_file
-    from pbrdf.readings import as_scan
+    from pbrdf.observation.readings import as_scan
 
     loaded = pbrdf.load_scene(scene)
     target_file = output or scene.with_name(f"{scene.stem}-scan.csv")

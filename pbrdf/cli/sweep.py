@@ -12,7 +12,7 @@ from pbrdf.cli import options
 from pbrdf.cli.options import Stokes
 
 if TYPE_CHECKING:
-    from pbrdf.scene import Scene
+    from pbrdf.scene.scene import Scene
 
 # Option name: (part of the scene, field, fields it takes the place of)
 VARIED = {
@@ -119,7 +119,7 @@ def changed(scene: "Scene", values: Mapping[str, float]) -> "Scene":
         If the scene has no such parameter, or a value is out of its range.
     """
     from pbrdf import GaussianSurface, Material, Scene
-    from pbrdf.contaminant_tables import with_value
+    from pbrdf.scene.contaminant_tables import with_value
 
     changes: dict[str, dict[str, Any]] = {"surface": {}, "substrate": {}}
     contaminants = scene.contaminants

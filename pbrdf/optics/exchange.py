@@ -9,7 +9,7 @@ from math import pi
 import numpy as np
 import numpy.typing as npt
 
-from pbrdf.kernels.facet import fill_rotations
+from pbrdf.kernels.microfacet.facet import fill_rotations
 
 __all__ = ["CONVENTIONS", "Convention", "convert_brdf"]
 

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pbrdf.errors import require
-from pbrdf.kernels.fresnel import fill_amplitudes, fill_reflection, fill_transmission
+from pbrdf.kernels.optics.fresnel import fill_amplitudes, fill_reflection, fill_transmission
 from pbrdf.optics.checks import checked_kappa, checked_n
 
 __all__ = ["fresnel_amplitudes", "specular_mueller", "transmission_mueller"]

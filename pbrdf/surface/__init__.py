@@ -1,22 +1,10 @@
-"""Height maps, random surfaces and what lies on them."""
+"""Height maps and random surfaces."""
 
-from pbrdf.surface.bodies import Bodies, PlacedFilm, Placement, place
-from pbrdf.surface.drops import Drops
-from pbrdf.surface.films import Film
 from pbrdf.surface.gaussian import GaussianSurface
 from pbrdf.surface.heightmap import HeightMap
 from pbrdf.surface.measured import MeasuredSurface
-from pbrdf.surface.spheres import Spheres
 
-__all__ = [
-    "Bodies",
-    "Drops",
-    "Film",
-    "GaussianSurface",
-    "HeightMap",
-    "MeasuredSurface",
-    "PlacedFilm",
-    "Placement",
-    "Spheres",
-    "place",
-]
+__all__ = ["GaussianSurface", "HeightMap", "MeasuredSurface", "Surface"]
+
+# What a scene may stand on
+Surface = HeightMap | GaussianSurface | MeasuredSurface

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbrdf.kernels.embree import N_WORDS, Tree
+from pbrdf.kernels.terrain.embree import N_WORDS, Tree
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.mesh import Mesh, build_mesh
 

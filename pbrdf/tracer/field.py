@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pbrdf.kernels.heightfield import Terrain, block_maxima
-from pbrdf.kernels.horizon import build_horizon
-from pbrdf.kernels.relief import steepest_slope
+from pbrdf.kernels.terrain.heightfield import Terrain, block_maxima
+from pbrdf.kernels.terrain.horizon import build_horizon
+from pbrdf.kernels.terrain.relief import steepest_slope
 from pbrdf.surface.heightmap import HeightMap
 from pbrdf.tracer.guard import guards, ways
 
@@ -155,7 +155,9 @@ class Field:
             )
             raise ValueError(msg)
         narrow = np.concatenate([low, lengths])
-        for before, behind in guards(ways(self, theta_i, phi_i, narrow), least, sides):
+        for before, behind in guards(
+            ways(self.terrain, theta_i, phi_i, narrow), least, sides
+        ):
             low, lengths = before - below, sides - before - behind - above + below
             if lengths.min() > 0.0 and lengths.prod() >= LEAST_INTERIOR * sides.prod():
                 return np.concatenate([low, lengths])

@@ -6,14 +6,11 @@ how long the ways are, and so which guards are wide enough, before a run is trac
 """
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.kernels.pilot import ways_to_clear
-
-if TYPE_CHECKING:
-    from pbrdf.tracer.field import Field
+from pbrdf.kernels.paths.pilot import ways_to_clear
+from pbrdf.kernels.terrain.heightfield import Terrain
 
 # Share of rays that may be expected to leave sideways; hazard B5 tolerates 1e-3
 TARGET = 7e-4
@@ -25,7 +22,7 @@ SHARES = np.geomspace(0.1, 1e-4, 25)
 
 
 def ways(
-    field: "Field", theta_i: float, phi_i: float | None, launch: np.ndarray
+    terrain: Terrain, theta_i: float, phi_i: float | None, launch: np.ndarray
 ) -> np.ndarray:
     """Ways (rays, 2) [cells] after the last bounce to where light is clear of the map.
 
@@ -35,7 +32,7 @@ def ways(
     if phi_i is not None:
         azimuths = np.array([phi_i])
     found = np.empty((RAYS, RAYS, 2))
-    ways_to_clear(field.terrain, np.sin(theta_i), np.cos(theta_i), azimuths, launch, found)
+    ways_to_clear(terrain, np.sin(theta_i), np.cos(theta_i), azimuths, launch, found)
     return found.reshape(-1, 2)
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbrdf.kernels.embree import MeshFrame
+from pbrdf.kernels.terrain.embree import MeshFrame
 from pbrdf.tracer.field import Field
 
 # The mesh of a periodic surface goes on this many height ranges beyond the period

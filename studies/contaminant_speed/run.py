@@ -10,19 +10,20 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
 import pbrdf
-from pbrdf.kernels import jit, shading
-from pbrdf.kernels.beams import KX, KY, KZ, N_STATE, Room, X, Y, Z
-from pbrdf.kernels.binning import bin_edges
-from pbrdf.kernels.entry import Source, entry_line, first_ray, line_beam, wrap_into
-from pbrdf.kernels.events import N_HIT, next_event
-from pbrdf.kernels.sweep import N_FIRST
-from pbrdf.kernels.transparent import follow_beam, launch_beam
-from pbrdf.surface.bodies import place
+from pbrdf.contaminants.bodies import place
+from pbrdf.kernels import jit
+from pbrdf.kernels.bins.binning import bin_edges
+from pbrdf.kernels.bodies.beams import KX, KY, KZ, N_STATE, Room, X, Y, Z
+from pbrdf.kernels.bodies.events import N_HIT, next_event
+from pbrdf.kernels.bodies.transparent import follow_beam, launch_beam
+from pbrdf.kernels.paths import shading
+from pbrdf.kernels.terrain.entry import Source, entry_line, first_ray, line_beam, wrap_into
+from pbrdf.kernels.terrain.sweep import N_FIRST
+from pbrdf.simulation.plan import Plan
+from pbrdf.simulation.skips import SKIPS
+from pbrdf.simulation.trace import prepare, trace_sample
 from pbrdf.tracer.mesh import build_mesh
-from pbrdf.tracer.plan import Plan
-from pbrdf.tracer.skips import SKIPS
-from pbrdf.tracer.trace import prepare, trace_sample
-from pbrdf.tracer.world import WetField, media_of
+from pbrdf.tracer.wet_field import WetField, media_of
 
 WATER, PAINT = pbrdf.Material(1.333), pbrdf.Material(1.5)
 SURFACE = pbrdf.GaussianSurface(

@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from pbrdf import Drops, HeightMap, Material, Scene, simulate
-from pbrdf.surface.shapes import cap_radius, seen_radius
+from pbrdf.contaminants.shapes import cap_radius, seen_radius
 
 LEAF = Material(1.0, diffuse_albedo=0.3, name="Lambertian leaf")
 WATER = Material(1.333, name="water")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from pbrdf import Drops, GaussianSurface, HeightMap, Material
-from pbrdf.surface import Bodies, place
+from pbrdf.contaminants import Bodies, place
 
 HERE = Path(__file__).parent
 CONTACT = (179.0, 90.0, 15.0)

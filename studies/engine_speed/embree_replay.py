@@ -14,7 +14,7 @@ from llvmlite import ir
 from numba import carray, cfunc, types
 from numba.extending import intrinsic
 
-from pbrdf.kernels.embree import DIRECTION, N_WORDS, call_embree
+from pbrdf.kernels.terrain.embree import DIRECTION, N_WORDS, call_embree
 
 BATCH = 16_384
 

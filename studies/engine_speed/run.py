@@ -12,10 +12,10 @@ from embree_replay import Replay
 from plain import simulate_plainly
 
 import pbrdf
-from pbrdf.tracer.moments import Moments
-from pbrdf.tracer.plan import Plan, Tally
-from pbrdf.tracer.skips import SKIPS
-from pbrdf.tracer.trace import prepare, trace_sample
+from pbrdf.simulation.moments import Moments
+from pbrdf.simulation.plan import Plan, Tally
+from pbrdf.simulation.skips import SKIPS
+from pbrdf.simulation.trace import prepare, trace_sample
 
 SIZE = 512
 SLOPE = 0.30

@@ -4,7 +4,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from pbrdf.kernels import elementary, jit
+from pbrdf.kernels import jit
+from pbrdf.kernels.optics import elementary
 
 HALF_TURNS = np.pi / 2 * np.arange(-7, 8)
 

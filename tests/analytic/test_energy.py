@@ -16,7 +16,7 @@ from pbrdf.analytic import (
     reflectance,
     torrance_sparrow,
 )
-from pbrdf.kernels.volume import internal_reflectance
+from pbrdf.kernels.optics.volume import internal_reflectance
 
 MIRROR = Material.mirror()
 

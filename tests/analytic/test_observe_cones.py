@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from pbrdf import HeightMap, Material, Scene, observe
 from pbrdf.conventions import direction
-from pbrdf.kernels.observe_lens import lens_direction, lens_flux
+from pbrdf.kernels.cones.lens import lens_direction, lens_flux
 from tests.reference_optics import path_mueller, spherical
 
 LOSSY = Material(1.9, 0.4)

@@ -8,7 +8,7 @@ from scipy.special import erfc
 
 from pbrdf import GaussianSurface, Material, MicrofacetModel
 from pbrdf.analytic import SLOPE_DISTRIBUTIONS, SlopeTable
-from pbrdf.kernels import slopes as laws
+from pbrdf.kernels.microfacet import slopes as laws
 
 MIRROR = Material.mirror()
 

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from pbrdf import Material, MicrofacetModel
 from pbrdf.analytic.symbolic import rebind
-from pbrdf.kernels import facet, microfacet
+from pbrdf.kernels.microfacet import facet, microfacet
 
 pytestmark = pytest.mark.bench
 

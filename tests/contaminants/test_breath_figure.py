@@ -7,9 +7,14 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import Drops, GaussianSurface, HeightMap, Material, Spheres
-from pbrdf.surface import place
-from pbrdf.surface.breath_figure import breath_figure, coalesce, contact_distance, touching
-from pbrdf.surface.shapes import cap_radius
+from pbrdf.contaminants import place
+from pbrdf.contaminants.breath_figure import (
+    breath_figure,
+    coalesce,
+    contact_distance,
+    touching,
+)
+from pbrdf.contaminants.shapes import cap_radius
 
 SEED = np.random.SeedSequence(12)
 FLAT = HeightMap.flat(size=(400.0, 300.0))

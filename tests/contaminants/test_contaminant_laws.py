@@ -16,11 +16,11 @@ from pbrdf import (
     Spheres,
     simulate,
 )
-from pbrdf.kernels.bodies import Bodies, body_interval
-from pbrdf.surface.bodies import Bodies as Placed
-from pbrdf.surface.bodies import Placement
+from pbrdf.contaminants.bodies import Bodies as Placed
+from pbrdf.contaminants.bodies import Placement
+from pbrdf.kernels.bodies.bodies import Bodies, body_interval
 from pbrdf.tracer.field import Field
-from pbrdf.tracer.world import media_of, world_of
+from pbrdf.tracer.wet_field import media_of, world_of
 from tests.contaminants.scenes import assert_closed, clean_counters
 
 WATER, OIL, GLASS = Material(1.333), Material(1.47), Material(1.6)

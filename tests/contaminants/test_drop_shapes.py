@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from pbrdf.kernels.sessile import trace_profile
-from pbrdf.surface.sessile import ShapeMaker, flattened
-from pbrdf.surface.shapes import cap, cap_radius, cap_volume, contact_depth, sphere
+from pbrdf.contaminants.sessile import ShapeMaker, flattened
+from pbrdf.contaminants.shapes import cap, cap_radius, cap_volume, contact_depth, sphere
+from pbrdf.kernels.bodies.sessile import trace_profile
 
 LENGTH = 2725.7  # capillary length of water
 

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 from pbrdf import Drops, HeightMap, Material, Scene, Spheres, simulate
 from pbrdf.conventions import detector_bins
 from pbrdf.errors import AccuracyWarning
-from pbrdf.kernels.beams import KX, KY, KZ, N_STATE
-from pbrdf.kernels.interfaces import refract_beam
+from pbrdf.kernels.bodies.beams import KX, KY, KZ, N_STATE
+from pbrdf.kernels.bodies.interfaces import refract_beam
 from tests.contaminants.scenes import assert_closed, assert_within, clean_counters
 from tests.reference_optics import fresnel, path_mueller
 

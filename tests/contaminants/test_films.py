@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
 from pbrdf import Film, GaussianSurface, HeightMap, Material, Scene, simulate
-from pbrdf.kernels.volume import internal_reflectance
+from pbrdf.kernels.optics.volume import internal_reflectance
 from tests.contaminants.scenes import (
     assert_closed,
     assert_within,

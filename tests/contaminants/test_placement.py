@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import Drops, Film, GaussianSurface, HeightMap, Material, Scene, Spheres
-from pbrdf.surface import place
-from pbrdf.surface.ground import Ground
-from pbrdf.surface.shapes import cap
-from pbrdf.validity import contamination_warnings
+from pbrdf.contaminants import place
+from pbrdf.contaminants.ground import Ground
+from pbrdf.contaminants.shapes import cap
+from pbrdf.tracer.validity import contamination_warnings
 
 SEED = np.random.SeedSequence(5)
 ROUGH = GaussianSurface(

@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 from scipy.special import erfc
 
 from pbrdf import GaussianSurface, HeightMap
-from pbrdf.surface.ground import Ground
-from pbrdf.surface.wetting import (
+from pbrdf.contaminants.ground import Ground
+from pbrdf.contaminants.wetting import (
     cassie_contact_angle,
     effective_contact_angle,
     hemiwicking_angle,

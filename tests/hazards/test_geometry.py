@@ -13,8 +13,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
 from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels import jit
-from pbrdf.kernels.embree import first_face
-from pbrdf.kernels.heightfield import HIT, walk
+from pbrdf.kernels.terrain.embree import first_face
+from pbrdf.kernels.terrain.heightfield import HIT, walk
 from pbrdf.tracer import embree
 from pbrdf.tracer.embree import library as load_embree
 from pbrdf.tracer.field import Field

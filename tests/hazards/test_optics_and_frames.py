@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pbrdf import HeightMap, Material, Scene, simulate
-from pbrdf.kernels.fresnel import reflection_elements
+from pbrdf.kernels.optics.fresnel import reflection_elements
 from tests.reference_optics import path_mueller
 
 

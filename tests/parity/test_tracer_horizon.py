@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from pbrdf import GaussianSurface, HeightMap
-from pbrdf.kernels.heightfield import ESCAPED, corner_heights, facet_steps, walk
-from pbrdf.kernels.horizon import build_horizon, is_free
+from pbrdf.kernels.terrain.heightfield import ESCAPED, corner_heights, facet_steps, walk
+from pbrdf.kernels.terrain.horizon import build_horizon, is_free
 from pbrdf.tracer.field import Field
 
 RNG = np.random.default_rng(8)

@@ -5,10 +5,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
-from pbrdf.kernels import bin_fits, fresnel_table, shading
-from pbrdf.kernels.fresnel import reflection_elements
-from pbrdf.tracer import spectra
-from pbrdf.tracer.skips import SKIPS
+from pbrdf.kernels.bins import bin_fits
+from pbrdf.kernels.optics import fresnel_table
+from pbrdf.kernels.optics.fresnel import reflection_elements
+from pbrdf.kernels.paths import shading
+from pbrdf.simulation import spectra
+from pbrdf.simulation.skips import SKIPS
 
 SURFACE = GaussianSurface(
     shape=(128, 96), spacing=(1.0, 1.2), corr_length=(12.0, 16.0), slope_rms=0.4

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from pbrdf import HeightMap
-from pbrdf.kernels.heightfield import ESCAPED, HIT, SIDE, block_maxima, walk
+from pbrdf.kernels.terrain.heightfield import ESCAPED, HIT, SIDE, block_maxima, walk
 from pbrdf.tracer.field import Field
 from tests.brute_force import intersect
 

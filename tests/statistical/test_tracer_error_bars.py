@@ -7,8 +7,8 @@ from scipy.stats import chi2
 
 from pbrdf import GaussianSurface, Material, Scene, simulate
 from pbrdf.conventions import detector_bins
-from pbrdf.kernels.neighbours import share_noise
-from pbrdf.tracer.moments import neighbour_room
+from pbrdf.kernels.bins.neighbours import share_noise
+from pbrdf.simulation.moments import neighbour_room
 
 SURFACE = GaussianSurface(shape=(128, 128), spacing=1.0, corr_length=8.0, slope_rms=0.3)
 FIXED = SURFACE.sample(3)

@@ -1,0 +1,1 @@
+"""Kernels that add paths up in bins and judge their noise."""

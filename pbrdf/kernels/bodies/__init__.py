@@ -1,0 +1,1 @@
+"""Kernels of transparent bodies on a surface: shapes, hits, beams and events."""

@@ -1,0 +1,219 @@
+"""Light among transparent bodies and films on an opaque height field.
+
+A beam goes from event to event: it enters or leaves a body or the film, or meets something
+opaque, and may come apart there (`pbrdf.kernels.bodies.splitting`). The part at the top of
+the stack is followed to its end, then those below it.
+"""
+
+from pbrdf.kernels import jit
+from pbrdf.kernels.bins.binning import bin_of_direction
+from pbrdf.kernels.bodies.beams import (
+    EVENTS,
+    FACET,
+    FREE,
+    KX,
+    KY,
+    KZ,
+    LEFT,
+    MUELLER,
+    N_INSIDE,
+    NOTHING,
+    START,
+    SX,
+    SY,
+    SZ,
+    X,
+    Y,
+    Z,
+)
+from pbrdf.kernels.bodies.bodies import HIT_T
+from pbrdf.kernels.bodies.events import (
+    ASIDE,
+    ASTRAY,
+    CONFORMAL,
+    OUT,
+    first_event,
+    move_beam,
+    next_event,
+)
+from pbrdf.kernels.bodies.interfaces import turn_columns
+from pbrdf.kernels.bodies.splitting import (
+    CROWDED,
+    absorb_on_the_way,
+    meet_interface,
+    meet_solid,
+    solid_at,
+    survives,
+)
+from pbrdf.kernels.paths.ray_bounce import exit_turn
+from pbrdf.kernels.paths.shading import (
+    LEAKED,
+    N_ESCAPED,
+    N_LEAKED,
+    N_MISMATCH,
+    N_ORDERS,
+    N_SEGMENTS,
+    N_SIDE,
+    N_TRUNCATED,
+    SIDEWAYS,
+    TRUNCATED,
+)
+from pbrdf.kernels.terrain.entry import entry_line, first_ray, line_beam, wrap_into
+from pbrdf.kernels.terrain.sweep import sweep_line
+
+MAX_STEPS = 10_000_000  # of one ray with all its parts
+
+
+@jit(forceinline=True)
+def deposit(state, top, columns, w, cos_phi_i, sin_phi_i, tally):
+    """Add the matrix of a beam that leaves the scene to its bin."""
+    k_x, k_y, k_z = state[top, KX], state[top, KY], state[top, KZ]
+    c2, s2 = exit_turn(
+        k_x, k_y, k_z, state[top, SX], state[top, SY], state[top, SZ],
+        cos_phi_i, sin_phi_i,
+    )  # fmt: skip
+    turn_columns(state, top, columns, c2, s2)
+    i_theta, i_dphi = bin_of_direction(
+        k_x, k_y, k_z, cos_phi_i, sin_phi_i, tally.zenith, tally.azimuth
+    )
+    order = int(min(state[top, EVENTS], tally.flux.shape[1])) - 1
+    tally.counts[N_ESCAPED] += 1
+    tally.counts[N_ORDERS + order] += 1
+    tally.lit[order, i_theta, i_dphi] = True
+    for row in range(columns):
+        for column in range(columns):
+            tally.flux[w, order, i_theta, i_dphi, row, column] += state[
+                top, MUELLER + 4 * row + column
+            ]
+
+
+@jit(forceinline=True)
+def end_beam(state, top, kind, columns, w, cos_phi_i, sin_phi_i, tally):
+    """Book what has become of a beam that goes no further."""
+    if kind == OUT and state[top, EVENTS] > 0.0 and state[top, KZ] > 0.0:
+        deposit(state, top, columns, w, cos_phi_i, sin_phi_i, tally)
+    elif kind == ASIDE:
+        tally.counts[N_SIDE] += 1
+        tally.energy[w, SIDEWAYS] += state[top, MUELLER]
+    elif kind < OUT:
+        tally.counts[N_TRUNCATED] += 1
+        tally.energy[w, TRUNCATED] += state[top, MUELLER]
+    else:
+        tally.counts[N_LEAKED] += 1
+        tally.energy[w, LEAKED] += state[top, MUELLER]
+        if kind == ASTRAY:
+            tally.counts[N_MISMATCH] += 1
+
+
+@jit(forceinline=True)
+def launch_beam(state, x, y, z, beam, columns):
+    """Start a beam of unit matrix in the air, of the light that `line_beam` tells."""
+    _, _, sin_t, cos_t, cos_b, sin_b, s_x, s_y, s_z = beam
+    state[0, X] = x
+    state[0, Y] = y
+    state[0, Z] = z
+    state[0, KX] = -sin_t * cos_b
+    state[0, KY] = -sin_t * sin_b
+    state[0, KZ] = -cos_t
+    state[0, SX] = s_x
+    state[0, SY] = s_y
+    state[0, SZ] = s_z
+    state[0, START] = FREE
+    state[0, FACET] = -1.0
+    state[0, EVENTS] = 0.0
+    state[0, LEFT] = NOTHING
+    state[0, N_INSIDE] = 0.0
+    for element in range(16):
+        state[0, MUELLER + element] = 0.0
+    for row in range(columns):
+        state[0, MUELLER + 5 * row] = 1.0
+
+
+@jit(forceinline=True)
+def follow_beam(
+    world, w, top, kind, stream, number, step, cos_phi, sin_phi, max_events, columns, room,
+    tally,
+):  # fmt: skip
+    """Take the beam at the top of the stack to its next event; returns the new top."""
+    state, hit = room.state, room.hit
+    if kind < OUT:
+        absorb_on_the_way(world, w, state, top, columns, hit[HIT_T], tally.energy)
+    if kind >= OUT or state[top, EVENTS] >= max_events:
+        end_beam(state, top, kind, columns, w, cos_phi, sin_phi, tally)
+        return top - 1
+
+    move_beam(world, state, top, kind, hit)
+    solid = solid_at(world, w, state, top, kind, hit)
+    if solid >= 0:
+        new = meet_solid(
+            world, w, state, top, kind, solid, hit, columns, stream, number, 2 * step,
+            tally.energy,
+        )  # fmt: skip
+    else:
+        new = meet_interface(
+            world, w, state, top, kind, hit, columns, stream, number, 2 * step
+        )
+        if new == CROWDED:
+            end_beam(state, top, ASTRAY, columns, w, cos_phi, sin_phi, tally)
+            return top - 1
+    if new >= 0 and not survives(state, new, columns, stream, number, 2 * step + 1):
+        return new - 1
+    return new
+
+
+@jit(forceinline=True)
+def trace_beams(
+    world, w, number, ray, source, cos_phi, sin_phi, max_events, columns, room, tally
+):  # fmt: skip
+    """Follow one ray of a line and all its parts until their light has left or is lost."""
+    swept = room.meetings.size > 0
+    top = 0
+    step = 0
+    while top >= 0:
+        if step == 0 and swept:
+            kind = first_event(world, room.state, room.meetings[ray], room.hit)
+        else:
+            kind = next_event(world, room.state, top, room.hit)
+        top = follow_beam(
+            world, w, top, kind, source.stream, number, step, cos_phi, sin_phi, max_events,
+            columns, room, tally,
+        )  # fmt: skip
+        step += 1
+        if step == MAX_STEPS and top >= 0:
+            end_beam(room.state, top, ASTRAY, columns, w, cos_phi, sin_phi, tally)
+            break
+    tally.counts[N_SEGMENTS] += step
+
+
+@jit(allocates=False)
+def trace_among_bodies(world, source, z_start, max_events, columns, room, tally):
+    """Trace rays of one incident direction over a scene with bodies or a film.
+
+    The rays start in a plane above everything; see
+    `pbrdf.kernels.paths.transport.trace_batch`.
+    """
+    terrain = world.terrain
+    launch = source.launch
+    for line in range(source.n_lines):
+        start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = (
+            entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
+        )
+        beam = line_beam(line, source)
+        if room.meetings.size > 0:
+            lift = world.film.height if world.film.kind == CONFORMAL else 0.0
+            sweep_line(terrain, line, source, z_start - lift, room.meetings)
+        first = first_ray(line, source)
+        rays = first_ray(line + 1, source) - first
+        for ray in range(rays):
+            s = length * ((ray + offset) / rays)
+            x = wrap_into(start_x + speed_x * s, launch[0], launch[2])
+            y = wrap_into(start_y + speed_y * s, launch[1], launch[3])
+            for w in range(tally.energy.shape[0]):
+                launch_beam(
+                    room.state, x * terrain.pitch_x, y * terrain.pitch_y, z_start,
+                    beam, columns,
+                )  # fmt: skip
+                trace_beams(
+                    world, w, first + ray, ray, source, cos_phi, sin_phi, max_events,
+                    columns, room, tally,
+                )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Kernels of the analytical model: slopes, shadowing, the mirroring facet."""

@@ -1,0 +1,1 @@
+"""Kernels of what an interface does to light."""

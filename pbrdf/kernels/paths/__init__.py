@@ -1,0 +1,1 @@
+"""Kernels that follow paths over an opaque surface."""

@@ -1,0 +1,104 @@
+"""The first bounce of all rays of a line at once, and the end of those that then are free.
+
+The rays of a line share their direction and frame. What becomes of them at the facets that
+`sweep_line` found is one loop without branches, of which the compiler makes vector code.
+"""
+
+from collections import namedtuple
+
+from pbrdf.kernels import jit
+from pbrdf.kernels.bins.binning import exact_bin, rough_place
+from pbrdf.kernels.optics.frames import turn_frame
+from pbrdf.kernels.paths.ray_bounce import exit_turn, mirror, new_axis
+from pbrdf.kernels.paths.shading import (
+    ABSORBED,
+    COS_IN,
+    COS_OUT,
+    LABEL,
+    N_ESCAPED,
+    N_SEGMENTS,
+    SPECULAR,
+    TURN_C,
+    TURN_S,
+    tally_path,
+)
+from pbrdf.kernels.paths.spectra import gather_path
+from pbrdf.kernels.terrain.heightfield import corner_heights, steps_of
+from pbrdf.kernels.terrain.sweep import F_FACET, F_I, F_J
+
+# Numbers of a mirrored ray: direction, cosine of incidence, turn of the frame into the
+# plane of incidence and from there to the meridian of the exit, rough place in bins
+M_X, M_Y, M_Z, M_COS, M_IN_C, M_IN_S, M_OUT_C, M_OUT_S = 0, 1, 2, 3, 4, 5, 6, 7
+M_THETA, M_DPHI, N_MIRRORED = 8, 9, 10
+# Room for the longest line: first facets (rays, N_FIRST) of `sweep_line`, their slopes (2,
+# rays) and `mirrored` (rays * N_MIRRORED,)
+LineRoom = namedtuple("LineRoom", "meetings slopes mirrored")
+
+
+@jit(forceinline=True)
+def slopes_of_line(terrain, meetings, rays, slopes):
+    """Slopes of the facets that the rays of a line meet, (2, rays)."""
+    per_x = 1.0 / terrain.pitch_x
+    per_y = 1.0 / terrain.pitch_y
+    for ray in range(rays):
+        z00, z10, z01, z11 = corner_heights(
+            terrain.heights, int(meetings[ray, F_I]), int(meetings[ray, F_J]), True
+        )
+        step_x, step_y = steps_of(z00, z10, z01, z11, int(meetings[ray, F_FACET]))
+        slopes[0, ray] = step_x * per_x
+        slopes[1, ray] = step_y * per_y
+
+
+@jit(forceinline=True)
+def mirror_line(beam, rays, slopes, n_theta, n_dphi, mirrored):
+    """Reflect all rays of a line, into `mirrored` (rays * N_MIRRORED,).
+
+    The array is flat so that the compiler sees that rays do not touch each other.
+    """
+    cos_phi, sin_phi, sin_t, cos_t, cos_b, sin_b, s_x, s_y, s_z = beam
+    k_x = -sin_t * cos_b
+    k_y = -sin_t * sin_b
+    k_z = -cos_t
+    for ray in range(rays):
+        r_x, r_y, r_z, w_x, w_y, w_z, _, cos_beta = mirror(
+            k_x, k_y, k_z, slopes[0, ray], slopes[1, ray]
+        )
+        in_c, in_s = turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, w_x, w_y, w_z)
+        w_x, w_y, w_z = new_axis(s_x, s_y, s_z, w_x, w_y, w_z)
+        out_c, out_s = exit_turn(r_x, r_y, r_z, w_x, w_y, w_z, cos_phi, sin_phi)
+        at = ray * N_MIRRORED
+        mirrored[at + M_X] = r_x
+        mirrored[at + M_Y] = r_y
+        mirrored[at + M_Z] = r_z
+        mirrored[at + M_COS] = cos_beta
+        mirrored[at + M_IN_C] = in_c
+        mirrored[at + M_IN_S] = in_s
+        mirrored[at + M_OUT_C] = out_c
+        mirrored[at + M_OUT_S] = out_s
+        mirrored[at + M_THETA], mirrored[at + M_DPHI] = rough_place(
+            r_x, r_y, r_z, cos_phi, sin_phi, n_theta, n_dphi
+        )
+
+
+@jit(forceinline=True)
+def end_after_one(mirrored, at, label, cos_phi, sin_phi, record, spectra, optics, tally):
+    """Tally a path that one bounce has sent out, as `trace_ray` does."""
+    record[0, 0, COS_IN] = mirrored[at + M_COS]
+    record[0, 0, TURN_C] = mirrored[at + M_IN_C]
+    record[0, 0, TURN_S] = mirrored[at + M_IN_S]
+    record[0, 0, COS_OUT] = SPECULAR
+    record[0, 0, LABEL] = label
+    record[1, 0, TURN_C] = mirrored[at + M_OUT_C]
+    record[1, 0, TURN_S] = mirrored[at + M_OUT_S]
+    tally.counts[N_SEGMENTS] += 2
+    i_theta, i_dphi = exact_bin(
+        mirrored[at + M_THETA], mirrored[at + M_DPHI],
+        mirrored[at + M_X], mirrored[at + M_Y], mirrored[at + M_Z],
+        cos_phi, sin_phi, tally.zenith, tally.azimuth,
+    )  # fmt: skip
+    if spectra.sums.size > 0:
+        gather_path(N_ESCAPED, record, 0, 1, i_theta, i_dphi, spectra, optics, tally)
+        return
+    for w in range(tally.energy.shape[0]):
+        tally.energy[w, ABSORBED] += 1.0
+    tally_path(N_ESCAPED, record, 0, 1, i_theta, i_dphi, optics, tally)

@@ -1,0 +1,1 @@
+"""Kernels that find where a ray meets a height field."""

@@ -1,0 +1,128 @@
+"""Bundles of rays over one surface sample, from one end of the scan to the other."""
+
+import numpy as np
+
+from pbrdf.kernels.cones import paths as observe_paths
+from pbrdf.kernels.cones.lens import cap_flux, lens_flux
+from pbrdf.kernels.cones.paths import FAR_END, Bundle, Rule
+from pbrdf.kernels.cones.record import ALL, FORETOLD, GLINTS, N_AXES, Catch
+from pbrdf.kernels.paths import shading
+from pbrdf.observation.look import Sums, forward
+from pbrdf.tracer.field import Field
+
+# Largest cone that stands for one sample of the hemisphere [rad]
+WIDEST_SAMPLE = 0.2
+# A path was near a cone within so many times the angle at which it would just add to it,
+# at most this angle [rad] unless that is smaller
+NEAR = 4.0
+FARTHEST_NEAR = 0.35
+
+
+def send_bundles(
+    surface: Field, sample: Sums, rng: np.random.Generator, kind: int, first: int,
+    *, from_source: bool,
+) -> None:  # fmt: skip
+    """Send bundles from each distinct direction of one end to all cones of the other."""
+    look = sample.look
+    here, there = look.theta_s, look.theta_i
+    half_here, half_there = look.detector, look.source
+    turn = -look.dphi
+    omega_i, omega_s = look.solid_angles()
+    omega_there = omega_i
+    if from_source:
+        here, there = there, here
+        half_here, half_there = half_there, half_here
+        turn = look.dphi
+        omega_there = omega_s
+    phi = np.zeros(look.size)
+    if look.phi_i is not None:
+        phi = look.phi_i + (np.zeros(look.size) if from_source else look.dphi)
+    starts, member = np.unique(
+        np.round(np.stack([here, phi], axis=1), 12), axis=0, return_inverse=True
+    )
+    member = member.reshape(-1)
+
+    cos_spread = max(1.0 - 1.0 / look.hemisphere_samples, np.cos(WIDEST_SAMPLE))
+    rule = Rule(
+        kind, first, look.counts, float(look.hemisphere_samples), float(look.sample_decay),
+        cos_spread, np.sqrt(1.0 - cos_spread**2),
+    )  # fmt: skip
+    reach, chance = near_misses(half_here, half_there, counting=look.counts)
+    record = np.empty((look.max_bounces + 1, 1, shading.N_RECORD))
+    hits = np.empty((look.max_bounces, observe_paths.N_HIT))
+    shape = look.shape[1:]
+    for start, (theta, azimuth) in enumerate(starts):
+        group = np.flatnonzero(member == start)
+        targets = np.stack(
+            [
+                np.sin(there[group]), np.cos(there[group]), np.cos(turn[group]),
+                np.sin(turn[group]), np.full(len(group), np.cos(half_there)),
+                np.full(len(group), np.sin(half_there)), np.full(len(group), np.cos(reach)),
+                np.full(len(group), chance),
+            ],
+            axis=1,
+        )  # fmt: skip
+        launch = surface.entry_rectangle(
+            theta, None if look.phi_i is None else azimuth, half_here
+        )
+        bundle = Bundle(
+            np.sin(theta), np.cos(theta), azimuth, look.phi_i is None, np.cos(half_here),
+            np.sin(half_here), launch, surface.entry_lines(launch, look.n_rays),
+            look.n_rays, rng.random(5), rng.integers(2**63, dtype=np.uint64),
+        )  # fmt: skip
+        catch = Catch(
+            np.zeros((3, len(group), *shape)),
+            np.zeros((2, len(group), shape[0]), dtype=np.int64),
+            np.zeros((shape[1], shading.N_ENERGIES)),
+            np.zeros(shading.N_COUNTS, dtype=np.int64), np.zeros((4, 4)),
+        )  # fmt: skip
+        axes = np.empty((len(group), N_AXES))
+        observe_paths.trace_bundles(
+            surface.terrain, bundle, targets, axes, record, hits, look.optics, rule, catch
+        )
+        aside = 0 if look.base.shape[1] > 0 else int(catch.counts[shading.N_SIDE])
+        if aside >= look.n_rays:
+            msg = (
+                f"n_rays must leave some rays on the finite map, got {look.n_rays} a "
+                f"sample, all of which left it sideways at {theta:.4g} rad. Take more "
+                "rays, a larger map or HeightMap.mirrored()."
+            )
+            raise ValueError(msg)
+        scale = 1.0 / ((look.n_rays - aside) * omega_there[group])
+        flux = catch.flux * scale[:, None, None, None, None]
+        foretold = flux[FORETOLD] * scale[:, None, None, None, None]
+        sample.brdf[group] += flux[ALL] if from_source else forward(flux[ALL])
+        sample.glints[group] += flux[GLINTS] if from_source else forward(flux[GLINTS])
+        sample.foretold[group] += foretold if from_source else foretold.swapaxes(-1, -2)
+        sample.caught[group] += catch.caught[ALL]
+        sample.glints_caught[group] += catch.caught[GLINTS]
+        # A bundle weighs at most as the smaller of the two cones
+        weight = np.minimum(1.0, (np.sin(half_there) / np.sin(half_here)) ** 2)
+        sample.one[group] = np.maximum(sample.one[group], (weight * scale)[:, None])
+        if kind != FAR_END:
+            # The far end follows only some paths; the others hold all the energy
+            sample.energy += catch.energy
+            sample.valued += look.n_rays
+        sample.counts += catch.counts
+        sample.bundles += look.n_rays
+
+
+def near_misses(
+    half_here: float, half_there: float, *, counting: bool
+) -> tuple[float, float]:
+    """Angle within which a path was near a cone, and the mean square of its share there.
+
+    A path that left anywhere as near would have been as likely: from the strength of those
+    that did follows the variance of what a cone gets by luck, before it gets any.
+    """
+    touching = half_there if counting else half_here + half_there
+    reach = max(touching, min(NEAR * touching, FARTHEST_NEAR))
+    edges = np.linspace(0.0, touching, 201)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    share = np.ones_like(middle)
+    if not counting:
+        here, there = ((np.cos(half), np.sin(half)) for half in (half_here, half_there))
+        share = np.array([lens_flux(c, 1.0, c, *here, *there) for c in np.cos(middle)])
+        share = share / cap_flux(1.0, here[1])
+    ring = -np.diff(np.cos(edges)) / (1.0 - np.cos(reach))
+    return reach, float(np.sum(share**2 * ring))

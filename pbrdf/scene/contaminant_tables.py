@@ -1,0 +1,158 @@
+"""Contaminants in TOML files: degrees, micrometres, drops per square millimetre."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbrdf.contaminants.drops import Drops
+from pbrdf.contaminants.films import Film
+from pbrdf.contaminants.spheres import Spheres
+from pbrdf.errors import DataFileError
+from pbrdf.optics.materials import Material
+from pbrdf.scene.toml_tables import check_keys, check_present, kind_of, material_table
+from pbrdf.scene.toml_tables import read_material as read_material_table
+
+PLACE = "contaminants"
+KINDS: dict[str, type[Drops | Spheres | Film]] = {
+    "drops": Drops, "spheres": Spheres, "film": Film,
+}  # fmt: skip
+
+# Key in the file: (field, what a value in the file is in the units of the field)
+_KEYS: dict[str, dict[str, tuple[str, float]]] = {
+    "drops": {
+        "contact_angle_deg": ("contact_angle", np.pi / 180),
+        "volume_per_area_um": ("volume_per_area", 1.0),
+        "coverage": ("coverage", 1.0),
+        "number_density_per_mm2": ("number_density", 1e-6),
+        "width": ("width", 1.0),
+        "capillary_length_um": ("capillary_length", 1.0),
+        "positions_um": ("positions", 1.0),
+        "volume_um3": ("volume", 1.0),
+    },
+    "spheres": {
+        "radius_um": ("radius", 1.0),
+        "coverage": ("coverage", 1.0),
+        "number_density_per_mm2": ("number_density", 1e-6),
+        "width": ("width", 1.0),
+        "sink": ("sink", 1.0),
+        "positions_um": ("positions", 1.0),
+    },
+    "film": {"thickness_um": ("thickness", 1.0)},
+}
+# Words, whole numbers and switches, which have no unit
+_WORDS = {
+    "drops": ("seed", "sizes", "gravity", "roughness"),
+    "spheres": ("seed", "sizes"),
+    "film": ("level",),
+}
+_NEEDED = {
+    "drops": ("contact_angle_deg",),
+    "spheres": ("radius_um", "material"),
+    "film": ("thickness_um",),
+}
+
+
+def contaminant_table(contaminant: Drops | Spheres | Film) -> dict[str, Any]:
+    """Write a contaminant as a TOML table, without what is as by default."""
+    kind = next(name for name, cls in KINDS.items() if isinstance(contaminant, cls))
+    table: dict[str, Any] = {"type": kind}
+    defaults = {
+        name: field.default for name, field in KINDS[kind].__dataclass_fields__.items()
+    }
+    for key, (name, unit) in _KEYS[kind].items():
+        value = getattr(contaminant, name)
+        if value is None or (np.ndim(value) == 0 and value == defaults[name]):
+            continue
+        table[key] = _in_file(value, unit)
+    for name in _WORDS[kind]:
+        value = getattr(contaminant, name)
+        if value is not None and value != defaults[name]:
+            table[name] = value
+    assert isinstance(contaminant.material, Material)  # names are looked up at once
+    material = material_table(contaminant.material)
+    return table | {"material": material.get("material", material)}
+
+
+def read_contaminant(table: Mapping[str, Any], source: Path) -> Drops | Spheres | Film:
+    """Read one table [[contaminants]].
+
+    Raises
+    ------
+    DataFileError
+        If a key is unknown, missing or has a wrong value.
+    """
+    table = dict(table)
+    kind = kind_of(table, KINDS, PLACE, source)
+    known = {"material", *_KEYS[kind], *_WORDS[kind]}
+    check_keys(table, known, f"{PLACE} {kind}", source)
+    check_present(table, _NEEDED[kind], f"{PLACE} {kind}", source)
+    given: dict[str, Any] = {
+        name: _from_file(key, table[key], unit, source)
+        for key, (name, unit) in _KEYS[kind].items()
+        if key in table
+    }
+    given |= {name: table[name] for name in _WORDS[kind] if name in table}
+    material = table.get("material")
+    if isinstance(material, dict):
+        given["material"] = read_material_table(material, f"{PLACE}.material", source)
+    elif material is not None:
+        given["material"] = material
+    try:
+        return KINDS[kind](**given)
+    except (TypeError, ValueError) as error:
+        problem = f"[{PLACE} {kind}]: {str(error).rstrip('.')}"
+        raise DataFileError(source, problem, "See the documented keys.") from error
+
+
+def with_value(
+    contaminants: Sequence[Drops | Spheres | Film], key: str, value: float
+) -> tuple[Drops | Spheres | Film, ...]:
+    """Return the contaminants with another value, in the unit of the file.
+
+    Raises
+    ------
+    ValueError
+        Unless exactly one of them has a number under this key.
+    """
+    found = []
+    for number, one in enumerate(contaminants):
+        kind = next(name for name, cls in KINDS.items() if isinstance(one, cls))
+        name, unit = _KEYS[kind].get(key, ("", 1.0))
+        if name and np.ndim(getattr(one, name)) == 0 and getattr(one, name) is not None:
+            found.append((number, name, unit))
+    if len(found) != 1:
+        msg = (
+            f"{key} must be given by one contaminant of the scene to be varied, got "
+            f"{len(found)} that have it. Vary another key, or write one scene file each."
+        )
+        raise ValueError(msg)
+    number, name, unit = found[0]
+    listed = list(contaminants)
+    change: dict[str, Any] = {name: value * unit}
+    listed[number] = replace(listed[number], **change)
+    return tuple(listed)
+
+
+def _in_file(value: Any, unit: float) -> Any:
+    """Return a value in the unit of the file, such that reading gives it back."""
+    if unit == 1.0:
+        return value.tolist() if isinstance(value, np.ndarray) else float(value)
+    # 15 digits read well; where they lose the last bit, all of them do not
+    short = float(f"{value / unit:.15g}")
+    return short if short * unit == value else float(value / unit)
+
+
+def _from_file(key: str, value: Any, unit: float, source: Path) -> Any:
+    """Return numbers in the unit of the field."""
+    try:
+        numbers = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataFileError(
+            source, f"[{PLACE}]: {key!r} is {value!r}", "Write numbers."
+        ) from error
+    if isinstance(value, bool):
+        raise DataFileError(source, f"[{PLACE}]: {key!r} is {value!r}", "Write a number.")
+    return numbers * unit if numbers.ndim else float(numbers) * unit

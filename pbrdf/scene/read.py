@@ -1,0 +1,141 @@
+"""Scenes in TOML files."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbrdf.errors import DataFileError
+from pbrdf.optics.materials import Material
+from pbrdf.scene.contaminant_tables import read_contaminant
+from pbrdf.scene.scene import Scene
+from pbrdf.scene.toml_tables import (
+    MATERIAL_KEYS,
+    check_keys,
+    check_present,
+    kind_of,
+    read_material,
+    read_toml,
+    required,
+)
+from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, Surface
+
+_SURFACE_KEYS = {
+    "gaussian": {"shape", "spacing_um", "corr_length_um", "slope_rms", "height_rms_um"},
+    "height_map": {"file", "heights_um", "spacing_um", "periodic", "labels"},
+    "flat": {"size_um"},
+    "measured": {
+        "shape", "spacing_um", "corr_length_um", "height_rms_um",
+        "lags", "autocorrelation", "quantiles",
+    },
+}  # fmt: skip
+
+
+def load_scene(path: str | Path) -> Scene:
+    """Read a scene from its TOML file.
+
+    Lengths carry `_um` in their key. Heights come from a .npy file named relative to the
+    TOML file, or inline. What lies on the surface stands in tables [[contaminants]]. Other
+    tables are left to their readers.
+
+    Raises
+    ------
+    DataFileError
+        If the file is not TOML, or a key is unknown, missing or has a wrong value.
+    """
+    source = Path(path)
+    document = read_toml(source)
+    surface = required(document, "surface", source)
+    substrate = required(document, "substrate", source)
+    try:
+        return Scene(
+            _read_surface(surface, source),
+            _read_substrate(substrate, source),
+            _read_contaminants(document.get("contaminants", []), source),
+        )
+    except DataFileError:
+        raise
+    except (TypeError, ValueError) as error:
+        problem = str(error).rstrip(".")
+        raise DataFileError(source, problem, "See the documented keys.") from error
+
+
+def _read_surface(table: dict[str, Any], source: Path) -> Surface:
+    kind = kind_of(table, _SURFACE_KEYS, "surface", source)
+    check_keys(table, _SURFACE_KEYS[kind], "surface", source)
+    if kind == "flat":
+        return HeightMap.flat(size=_pair(table.get("size_um", 1.0)))
+    if kind == "gaussian":
+        check_present(table, ("shape", "spacing_um", "corr_length_um"), "surface", source)
+        return GaussianSurface(
+            shape=_pair(table["shape"]),
+            spacing=_pair(table["spacing_um"]),
+            corr_length=_pair(table["corr_length_um"]),
+            slope_rms=table.get("slope_rms"),
+            height_rms=table.get("height_rms_um"),
+        )
+    if kind == "measured":
+        check_present(table, sorted(_SURFACE_KEYS[kind] - {"quantiles"}), "surface", source)
+        return MeasuredSurface(
+            shape=_pair(table["shape"]),
+            spacing=_pair(table["spacing_um"]),
+            height_rms=table["height_rms_um"],
+            corr_length=_pair(table["corr_length_um"]),
+            lags=tuple(table["lags"]),
+            autocorrelation=tuple(table["autocorrelation"]),
+            quantiles=tuple(table["quantiles"]) if "quantiles" in table else None,
+        )
+    if ("file" in table) == ("heights_um" in table):
+        raise DataFileError(
+            source,
+            "[surface]: heights come from 'file' or 'heights_um'",
+            "Give exactly one.",
+        )
+    if "spacing_um" not in table:
+        raise DataFileError(source, "[surface]: key 'spacing_um' is missing", "Give it.")
+    _check_type(table, "periodic", bool, "Write true or false.", source)
+    _check_type(table, "file", str, "Name a .npy file.", source)
+    heights = table.get("heights_um")
+    if heights is None:
+        file = source.parent / table["file"]
+        try:
+            heights = np.load(file, allow_pickle=False)
+        except (OSError, ValueError) as error:
+            raise DataFileError(
+                source, f"[surface]: file {table['file']!r} cannot be read ({error})",
+                "Give a .npy file of heights [um], x first.",
+            ) from error  # fmt: skip
+    return HeightMap(
+        heights,
+        _pair(table["spacing_um"]),
+        periodic=bool(table.get("periodic", False)),
+        labels=table.get("labels"),
+    )
+
+
+def _read_substrate(table: dict[str, Any], source: Path) -> Material | list[Material]:
+    check_keys(table, {*MATERIAL_KEYS, "materials"}, "substrate", source)
+    if "materials" in table:
+        return [read_material(entry, "substrate", source) for entry in table["materials"]]
+    return read_material(table, "substrate", source)
+
+
+def _read_contaminants(value: Any, source: Path) -> list[Any]:
+    """Read the tables [[contaminants]]."""
+    if not isinstance(value, list) or not all(isinstance(one, dict) for one in value):
+        raise DataFileError(
+            source, "'contaminants' is no list of tables", "Write [[contaminants]]."
+        )
+    return [read_contaminant(one, source) for one in value]
+
+
+def _check_type(
+    table: Mapping[str, Any], key: str, kind: type, cure: str, source: Path
+) -> None:
+    if key in table and not isinstance(table[key], kind):
+        raise DataFileError(source, f"[surface]: {key!r} is {table[key]!r}", cure)
+
+
+def _pair(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value

@@ -1,0 +1,127 @@
+"""A scene: surface, substrate and what lies on it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pbrdf.contaminants import Drops, Film, Spheres
+from pbrdf.optics import library
+from pbrdf.optics.materials import Material
+from pbrdf.scene.write import write_scene
+from pbrdf.surface import HeightMap, Surface
+
+Contamination = Drops | Spheres | Film
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A surface of one material, and the contaminants on it.
+
+    Parameters
+    ----------
+    surface : HeightMap, GaussianSurface or MeasuredSurface
+        A fixed surface, or an ensemble of which realisations are drawn.
+    substrate : Material or str, or a sequence of them
+        Material under the surface, or its name in the library; several where the labels of
+        a HeightMap number them.
+    contaminants : Drops, Spheres or Film, or a sequence of them
+        What lies on the surface; where two overlap, the first rules. One Film at most.
+
+    Raises
+    ------
+    TypeError
+        If the surface or a contaminant is of another type.
+    ValueError
+        If the library does not know the material, or two contaminants are films.
+
+    Examples
+    --------
+    >>> from pbrdf.contaminants import Film
+    >>> scene = Scene(HeightMap.flat(size=(10.0, 10.0)), "bk7", Film(thickness=5.0))
+    >>> scene.substrate.name, scene.contaminants[0].material.name
+    ('bk7', 'water')
+    """
+
+    surface: Surface
+    substrate: Material | tuple[Material, ...]
+    contaminants: tuple[Contamination, ...] = ()
+
+    def __init__(
+        self,
+        surface: Surface,
+        substrate: Material | str | Sequence[Material | str],
+        contaminants: Contamination | Sequence[Contamination] = (),
+    ) -> None:
+        if not isinstance(surface, Surface):
+            msg = (
+                f"surface must be a HeightMap, GaussianSurface or MeasuredSurface, got "
+                f"{type(surface).__name__}. Wrap an array of heights [um] in HeightMap."
+            )
+            raise TypeError(msg)
+        several = not isinstance(substrate, str | Material)
+        listed: Any = substrate if several else (substrate,)
+        materials = tuple(library.get(m) if isinstance(m, str) else m for m in listed)
+        _check_labels(surface, materials)
+        object.__setattr__(self, "surface", surface)
+        object.__setattr__(self, "substrate", materials if several else materials[0])
+        object.__setattr__(self, "contaminants", _checked(contaminants))
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """Materials of the substrate, in the order of the labels."""
+        return (self.substrate,) if isinstance(self.substrate, Material) else self.substrate
+
+    def to_toml(self, path: str | Path | None = None) -> str:
+        """TOML text of the scene, also written to `path` if given.
+
+        The heights of a map beyond 4096 nodes go to `<path>.npy` beside the file.
+
+        Raises
+        ------
+        ValueError
+            If such a map has no path to be written to.
+        """
+        return write_scene(
+            self.surface,
+            self.substrate,
+            self.contaminants,
+            None if path is None else Path(path),
+        )
+
+
+def _checked(given: Contamination | Sequence[Contamination]) -> tuple[Contamination, ...]:
+    """Return the contaminants as a tuple; refuse other types and a second film."""
+    listed = (given,) if isinstance(given, Contamination) else tuple(given)
+    for number, one in enumerate(listed):
+        if not isinstance(one, Contamination):
+            msg = (
+                "contaminants must be Drops, Spheres or Film, got "
+                f"{type(one).__name__} at index {number}. Wrap what lies on the surface "
+                "in one of these."
+            )
+            raise TypeError(msg)
+    films = sum(isinstance(one, Film) for one in listed)
+    if films > 1:
+        msg = f"contaminants must hold at most one Film, got {films}. Leave one out."
+        raise ValueError(msg)
+    return listed
+
+
+def _check_labels(surface: Surface, materials: tuple[Material, ...]) -> None:
+    """Refuse labels that name no material, and materials that no label can name."""
+    for material in materials:
+        if not isinstance(material, Material):
+            msg = (
+                f"substrate must be a Material or the name of one, got "
+                f"{type(material).__name__}. Write Material(n, kappa)."
+            )
+            raise TypeError(msg)
+    labels = surface.labels if isinstance(surface, HeightMap) else None
+    highest = 0 if labels is None else int(labels.max())
+    if highest >= len(materials) or (labels is None and len(materials) != 1):
+        msg = (
+            f"substrate must have one material for each label, got {len(materials)} for "
+            f"labels up to {highest}. Give a list of materials and HeightMap(..., labels=)."
+        )
+        raise ValueError(msg)

@@ -1,0 +1,143 @@
+"""What is traced over one surface sample, and the tally that comes back."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pbrdf.conventions import BOUNCES
+from pbrdf.kernels.bodies.events import Media
+from pbrdf.kernels.paths import shading
+from pbrdf.kernels.paths.spectra import N_SUMS, Spectra
+from pbrdf.simulation.spectra import WORTHWHILE, Spectrum
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Incident directions, materials and bins of a run; the same for every sample.
+
+    Attributes
+    ----------
+    theta_i : ndarray, shape (angles,)
+        Zenith angles of the source. [rad]
+    phi_i : float or None
+        Azimuth of the source; None spreads it evenly over the circle. [rad]
+    n_rays, max_bounces : int
+        Rays an incident direction and sample, and where their paths are cut.
+    n, kappa : ndarray, shape (wavelengths, materials)
+        Index of the substrate. [1]
+    base : ndarray, shape (wavelengths, materials) or (wavelengths, 0)
+        Strength of the diffuse base under the interface; of no width where there is none.
+    n_stokes : int
+        4 for (I, Q, U, V), 3 without V, 1 for I alone.
+    n_theta, n_dphi : int
+        Detector bins.
+    skips : frozenset of str
+        Names of the skips of `pbrdf.simulation.skips` that are allowed.
+    media : Media or None
+        Constants of what lies on the surface; None on a clean one.
+    half_angle : float
+        Half-angle of the source. [rad]
+    fold : bool
+        Whether each sample is averaged with its mirror image in the plane of incidence.
+    """
+
+    theta_i: np.ndarray
+    phi_i: float | None
+    n_rays: int
+    max_bounces: int
+    n: np.ndarray
+    kappa: np.ndarray
+    base: np.ndarray
+    n_stokes: int
+    n_theta: int
+    n_dphi: int
+    skips: frozenset[str] = frozenset()
+    media: Media | None = None
+    half_angle: float = 0.0
+    fold: bool = False
+
+    @property
+    def optics(self) -> shading.Optics:
+        """Constants of the substrate, for the kernels."""
+        return shading.Optics(self.n, self.kappa, self.base, self.n_stokes)
+
+    @property
+    def splits(self) -> bool:
+        """Whether a ray may come apart, so that only a part of it is lost sideways."""
+        return self.base.shape[1] > 0 or self.media is not None
+
+    @cached_property
+    def spectrum(self) -> Spectrum | None:
+        """What many wavelengths over one set of paths share; None for few."""
+        few = len(self.n) < WORTHWHILE
+        if few or "spectra" not in self.skips or self.media is not None:
+            return None
+        n_sums = 1 if self.n_stokes == 1 else N_SUMS
+        return Spectrum.of(
+            self.n, self.kappa, self.theta_i, (self.n_theta, self.n_dphi),
+            half_angle=self.half_angle, n_sums=n_sums,
+        )  # fmt: skip
+
+    def at(self, phi_i: float | None) -> "Plan":
+        """Return the plan of another azimuth; both share what does not depend on it."""
+        other = replace(self, phi_i=phi_i)
+        other.__dict__["spectrum"] = self.spectrum
+        return other
+
+    @property
+    def tally_shape(self) -> tuple[int, ...]:
+        """Shape (angles, wavelengths, bounces, n_theta, n_dphi, stokes, stokes)."""
+        return (
+            len(self.theta_i), len(self.n), len(BOUNCES),
+            self.n_theta, self.n_dphi, self.n_stokes, self.n_stokes,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tally:
+    """Flux, energy and counts of one sample, per incident direction.
+
+    `flux` has the shape of the plan and is not normalised; `lit` (angles, bounces, n_theta,
+    n_dphi) tells which bins paths came to; `energy` (angles, wavelengths, 4) is what was
+    absorbed, truncated, leaked and lost sideways; `counts` (angles, N_COUNTS) as in
+    `pbrdf.kernels.paths.shading`; `reports` and `notes` tell of contaminants. Where the
+    plan has a spectrum, `spectra` holds the light of each direction before it is shaded,
+    and the flux means nothing but where one has overflowed into it.
+    """
+
+    flux: np.ndarray
+    lit: np.ndarray
+    energy: np.ndarray
+    counts: np.ndarray
+    spectra: tuple[Spectra, ...] = ()
+    reports: tuple[Mapping[str, Any], ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def empty(cls, plan: Plan) -> "Tally":
+        """Nothing traced yet."""
+        angles, wavelengths, *by_bounces = plan.tally_shape[:5]
+        shared = plan.spectrum
+        return cls(
+            # Memory that nobody writes to costs nothing
+            flux=(np.empty if shared else np.zeros)(plan.tally_shape),
+            spectra=tuple(
+                shared.room(index, plan.max_bounces) for index in range(angles) if shared
+            ),
+            lit=np.zeros((angles, *by_bounces), dtype=bool),
+            energy=np.zeros((angles, wavelengths, shading.N_ENERGIES)),
+            counts=np.zeros((angles, shading.N_COUNTS), dtype=np.int64),
+        )
+
+    def emptied(self) -> "Tally":
+        """Give the same arrays for another sample; `Moments.add` has cleared the flux."""
+        self.lit.fill(False)
+        for light in self.spectra:
+            light.sums.fill(0.0)
+            light.state.fill(0)
+        self.energy.fill(0.0)
+        self.counts.fill(0)
+        return replace(self, reports=(), notes=())

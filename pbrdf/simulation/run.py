@@ -1,0 +1,286 @@
+"""Monte Carlo prediction of the Mueller BRDF of a scene: section 3 of the paper."""
+
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from pbrdf.errors import AccuracyWarning
+from pbrdf.kernels.paths.shading import N_LEAKED
+from pbrdf.scene.scene import Scene
+from pbrdf.simulation.moments import Moments
+from pbrdf.simulation.plan import Plan, Tally
+from pbrdf.simulation.results import to_dataset
+from pbrdf.simulation.skips import chosen_skips, explanation
+from pbrdf.simulation.trace import prepare, trace_sample
+from pbrdf.surface import HeightMap
+from pbrdf.tracer import arguments
+from pbrdf.tracer.embree import EmbreeField
+from pbrdf.tracer.field import Field
+from pbrdf.tracer.schedule import gather
+from pbrdf.tracer.validity import contamination_warnings, lost_ray_warnings
+from pbrdf.tracer.wet_field import WetField, contaminant_materials, media_of
+
+# Where paths are cut: on a clean surface, and where transparent bodies may catch light
+MOST_BOUNCES, MOST_EVENTS = 64, 1024
+
+
+def simulate(  # noqa: PLR0913  (the public signature)
+    scene: Scene,
+    theta_i: npt.ArrayLike,
+    *,
+    phi_i: npt.ArrayLike | str = 0.0,
+    n_rays: int = 100_000,
+    realizations: int = 1,
+    seed: int | None = 0,
+    max_bounces: int | None = None,
+    target_rel_error: float | None = None,
+    wavelength: npt.ArrayLike | None = None,
+    n_theta: int = 45,
+    n_dphi: int = 90,
+    stokes: str = "full",
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    skips: bool | Iterable[str] = True,
+    explain: bool = False,
+    source_half_angle: float = 0.0,
+    fold: bool = False,
+) -> xr.Dataset:
+    """Trace light from the source to the hemisphere and bin it as Mueller BRDF.
+
+    Parameters
+    ----------
+    scene : Scene
+        Surface and substrate.
+    theta_i : array_like, shape () or (angles,)
+        Zenith angle of the source, in [0, π/2). [rad]
+    phi_i : float, array_like of shape (azimuths,), or "uniform"
+        Azimuth of the source; several add the dimension `phi_i` and share surfaces and
+        entry points, so each gives what it would give alone. "uniform" averages over the
+        azimuth, as suits an isotropic surface. [rad]
+    n_rays : int
+        Rays an incident direction and realisation.
+    realizations : int
+        Surfaces drawn from a GaussianSurface; a HeightMap is traced with this many times
+        n_rays. With `target_rel_error` it is the least number.
+    seed : int or None
+        Makes the run reproducible bit for bit, for any number of workers; None draws one.
+    max_bounces : int, optional
+        Paths are cut after so many bounces, 64 on a clean surface and 1024 among
+        contaminants, where light may be caught; what they still carry is `truncated`.
+    target_rel_error : float, optional
+        Add samples until the largest stderr / M00 over the bins above a tenth of the peak
+        falls below this; the dataset says what was reached.
+    wavelength : array_like, optional
+        Vacuum wavelength, scalar or (wavelengths,); needed by tabulated materials. [um]
+    n_theta, n_dphi : int
+        Detector bins in zenith and azimuth; n_dphi is even.
+    stokes : {"full", "linear", "unpolarized"}
+        Stokes elements to compute: all, without V, or M00 alone.
+    workers : int, optional
+        Threads; all cores by default. Does not change the result.
+    progress : callable, optional
+        Called with (samples done, samples in all).
+    skips : bool or names of `pbrdf.simulation.skips.SKIPS`
+        What may be left out without changing the result; False sends every ray through
+        Embree. The same rays are traced in any case.
+    explain : bool
+        Say in the attribute `explanation` what was left out and why.
+    source_half_angle : float
+        Half-angle of the source, a disc of uniform radiance about (theta_i, phi_i): its
+        directions carry equal parts of the flux through the mean surface. dphi and the
+        Stokes frame stay those of its axis, the frame carried along great circles. [rad]
+    fold : bool
+        Average every sample with its mirror image in the plane of incidence, which halves
+        the variance. For scenes that are their own mirror image in the mean only: an
+        isotropic random surface on a square grid or a flat one, drops and spheres drawn
+        anew for every realisation, and phi_i="uniform".
+
+    Returns
+    -------
+    xarray.Dataset
+        `brdf` [sr^-1] and `brdf_stderr` (bounces, theta_i, [phi_i], [wavelength], theta_s,
+        dphi, stokes_out, stokes_in), `brdf_total` for all bounces, `albedo`, the energy
+        budget and `projected_solid_angle`; see `pbrdf.conventions.RESULT_VARIABLES`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is out of its range.
+
+    Warns
+    -----
+    AccuracyWarning
+        If realisations are too few for honest standard errors, geometric optics fails at
+        the wavelength, or rays were lost by a fault.
+
+    Notes
+    -----
+    A bin holds flux / (incident flux ∫cosθ dΩ). Standard errors come from independent
+    surface realisations, or from 32 or more batches of rays where the surface is fixed.
+    A bin that few rays reached shares the noise of bins like it around; one in the dark has
+    the error of one ray.
+
+    Examples
+    --------
+    >>> from pbrdf import HeightMap, Material
+    >>> scene = Scene(HeightMap.flat(size=(1.0, 1.0)), Material(1.5))
+    >>> result = simulate(scene, 0.0, n_rays=320)
+    >>> round(float(result.albedo.sel(bounces="1").item()), 6)
+    0.04
+    """
+    fixed = not arguments.varies(scene)
+    rays = arguments.count("n_rays", n_rays, arguments.BATCHES)
+    drawn = arguments.count("realizations", realizations, 1)
+    batched = fixed or drawn == 1
+    samples = max(arguments.BATCHES, drawn) if batched else drawn
+    angles = arguments.zeniths(theta_i)
+    azimuths, several = arguments.azimuths(phi_i)
+    waves = arguments.wavelengths(wavelength)
+    n, kappa, base = arguments.constants(scene, waves)
+    media = None
+    if scene.contaminants:
+        covering = contaminant_materials(scene.contaminants)
+        media = media_of(scene.materials, covering, waves)
+    bounces = max_bounces
+    if bounces is None:
+        bounces = MOST_BOUNCES if media is None else MOST_EVENTS
+    allowed = chosen_skips(skips)
+    if media is not None and "walk" not in allowed:
+        msg = (
+            f'skips must hold "walk" among contaminants, got {sorted(allowed)}. '
+            "The Embree route traces clean surfaces only."
+        )
+        raise ValueError(msg)
+    plan = Plan(
+        theta_i=angles,
+        phi_i=azimuths[0],
+        n_rays=-(-rays * drawn // samples) if batched else rays,
+        max_bounces=arguments.count("max_bounces", bounces, 1),
+        n=n,
+        kappa=kappa,
+        base=base,
+        n_stokes=arguments.stokes_count(stokes),
+        n_theta=arguments.count("n_theta", n_theta, 1),
+        n_dphi=arguments.even_count("n_dphi", n_dphi),
+        skips=allowed,
+        media=media,
+        half_angle=arguments.half_angle(source_half_angle, angles),
+        fold=arguments.mirrored(fold, scene, phi_i),
+    )
+    plans = [plan.at(azimuth) for azimuth in azimuths]
+    target = None if target_rel_error is None else arguments.target_error(target_rel_error)
+    arguments.check_scene(scene)
+    notes = arguments.scene_warnings(scene, angles, waves, drawn)
+    for note in notes:
+        warnings.warn(note, AccuracyWarning, stacklevel=2)
+
+    root = np.random.SeedSequence(seed)
+    # Tallies to use again: to make a large one costs more than to clear it
+    spare: deque[Tally] = deque()
+    if batched:
+        # The surface, or the one realisation asked for, stays the same in all batches
+        first = root.spawn(1)[0] if arguments.varies(scene) else root
+        draw = partial(_trace_fixed, _realize(scene, plan, first), plans, spare)
+    else:
+        draw = partial(_trace_realization, scene, plans, spare)
+
+    moments = [Moments(one) for one in plans]
+
+    def add(tallies: Sequence[Tally], run: Callable[..., Iterable[Any]]) -> None:
+        for one, tally in zip(moments, tallies, strict=True):
+            one.add(tally, run)
+            spare.append(tally.emptied())
+
+    done = gather(
+        draw, root, add, lambda: max(one.rel_error() for one in moments),
+        samples=samples, target=target, workers=arguments.worker_count(workers),
+        progress=progress,
+    )  # fmt: skip
+    for note in (late := _late_notes(moments, waves)):
+        warnings.warn(note, AccuracyWarning, stacklevel=2)
+    notes += late
+    return to_dataset(
+        moments,
+        scene,
+        several=several,
+        wavelength=waves,
+        attrs={
+            "seed": int(root.entropy),  # type: ignore[arg-type]
+            "n_rays": rays,
+            "realizations": 1 if batched else done,
+            "ray_batches": done if batched else 0,
+            "stderr_excludes_surface": batched,
+            "max_bounces": plan.max_bounces,
+            "stokes": stokes,
+            "phi_i": phi_i if isinstance(phi_i, str) else np.asarray(phi_i, float).tolist(),
+            "source_half_angle": plan.half_angle,
+            "folded": plan.fold,
+            "target_rel_error": np.nan if target is None else target,
+            "intersector": "height-field walk" if "walk" in allowed else "embree",
+            "explanation": _explain(scene, plan) if explain else [],
+            "contaminants": [str(dict(report)) for report in moments[0].reports],
+            "warnings": notes,
+        },
+    )
+
+
+def _late_notes(moments: Sequence[Moments], waves: np.ndarray | None) -> list[str]:
+    """Warnings of what lies on the surface and of lost rays, known only after tracing."""
+    first = moments[0]
+    late = list(first.notes)
+    for wave in () if waves is None else np.atleast_1d(waves):
+        late += contamination_warnings(first.reports, float(wave))
+    lost = sum(int(one.counts[:, N_LEAKED].sum()) for one in moments)
+    rays = first.plan.n_rays * first.samples * len(first.plan.theta_i) * len(moments)
+    return late + lost_ray_warnings(lost, rays)
+
+
+def _realize(
+    scene: Scene, plan: Plan, seed: np.random.SeedSequence
+) -> Field | EmbreeField | WetField:
+    """One realisation of the scene, ready for tracing."""
+    surface = scene.surface
+    if not isinstance(surface, HeightMap):
+        surface = surface.sample(seed)
+    target = prepare(surface, plan.skips)
+    if plan.media is None:
+        return target
+    assert isinstance(target, Field)  # contaminants exclude the Embree route
+    return WetField.of(target, surface, scene.contaminants, plan.media, seed)
+
+
+def _taken(spare: deque[Tally]) -> Tally | None:
+    try:
+        return spare.pop()
+    except IndexError:
+        return None
+
+
+def _trace_fixed(
+    target: Field | EmbreeField | WetField,
+    plans: Sequence[Plan],
+    spare: deque[Tally],
+    seed: np.random.SeedSequence,
+) -> list[Tally]:
+    """One sample of every azimuth: the same surface, streams and entry points."""
+    return [trace_sample(target, plan, seed, _taken(spare)) for plan in plans]
+
+
+def _trace_realization(
+    scene: Scene, plans: Sequence[Plan], spare: deque[Tally], seed: np.random.SeedSequence
+) -> list[Tally]:
+    heights, rays = seed.spawn(2)
+    return _trace_fixed(_realize(scene, plans[0], heights), plans, spare, rays)
+
+
+def _explain(scene: Scene, plan: Plan) -> list[str]:
+    surface = scene.surface
+    sample = surface if isinstance(surface, HeightMap) else surface.sample(0)
+    steepest = float(Field.of(sample).terrain.steepest)
+    return explanation(plan, periodic=sample.periodic, steepest=steepest)

@@ -1,0 +1,103 @@
+"""Trace one surface sample: clean, by the exact walk or by Embree, or contaminated."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pbrdf.kernels.bins.binning import bin_edges
+from pbrdf.kernels.bodies.beams import N_STATE, Room
+from pbrdf.kernels.bodies.events import N_HIT
+from pbrdf.kernels.bodies.transparent import trace_among_bodies
+from pbrdf.kernels.paths import shading
+from pbrdf.kernels.paths.first_bounce import N_MIRRORED, LineRoom
+from pbrdf.kernels.paths.spectra import close_sums
+from pbrdf.kernels.paths.transport import N_WAITING, sweep_batch, trace_batch
+from pbrdf.kernels.terrain.entry import Source
+from pbrdf.kernels.terrain.horizon import NO_HORIZON
+from pbrdf.kernels.terrain.sweep import N_FIRST
+from pbrdf.simulation.plan import Plan, Tally
+from pbrdf.simulation.spectra import NOTHING
+from pbrdf.surface.heightmap import HeightMap
+from pbrdf.tracer.embree import EmbreeField
+from pbrdf.tracer.field import Field
+from pbrdf.tracer.wet_field import WetField
+
+
+def prepare(surface: HeightMap, skips: frozenset[str]) -> Field | EmbreeField:
+    """Make a surface ready for tracing with the skips allowed: the walk, or else Embree."""
+    field = Field.of(surface)
+    terrain = field.terrain
+    if "steep" not in skips:
+        terrain = terrain._replace(free_slope=np.inf)
+    if "horizon" not in skips:
+        terrain = terrain._replace(horizon=NO_HORIZON)
+    field = replace(field, terrain=terrain)
+    return field if "walk" in skips else EmbreeField.of(field)
+
+
+def trace_sample(
+    target: Field | EmbreeField | WetField,
+    plan: Plan,
+    seed: np.random.SeedSequence,
+    room: Tally | None = None,
+) -> Tally:
+    """Trace every incident direction of the plan over one surface.
+
+    `room` is an empty tally to write into; without it one is made. Releases the interpreter
+    lock. The streams belong to the sample and the entry points to the stream, so that
+    neither the number of threads nor the intersector changes the rays.
+    """
+    tally = Tally.empty(plan) if room is None else room
+    if isinstance(target, WetField):
+        tally = replace(tally, reports=target.reports, notes=target.notes)
+    zenith, azimuth = bin_edges(plan.n_theta, plan.n_dphi)
+    record = np.empty((plan.max_bounces + 1, 1, shading.N_RECORD))
+    waiting = np.empty((plan.max_bounces, N_WAITING))
+    rng = np.random.default_rng(seed)
+    shifts = rng.random((len(plan.theta_i), 3))
+    streams = rng.integers(2**63, size=len(plan.theta_i), dtype=np.uint64)
+    if plan.half_angle > 0.0:
+        # Drawn last, so that a narrow beam keeps its rays
+        shifts = np.hstack([shifts, rng.random((len(plan.theta_i), 2))])
+    for index, theta in enumerate(plan.theta_i):
+        field = target if isinstance(target, Field) else target.field
+        launch = field.entry_rectangle(theta, plan.phi_i, plan.half_angle)
+        source = Source(
+            np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
+            launch, field.entry_lines(launch, plan.n_rays, plan.half_angle), plan.n_rays,
+            shifts[index], streams[index], np.sin(plan.half_angle),
+        )  # fmt: skip
+        bins = shading.Tally(
+            zenith, azimuth, tally.flux[index], tally.lit[index], tally.energy[index],
+            tally.counts[index], np.zeros((4, 4)),
+        )  # fmt: skip
+        # One pass along each line of entry points finds all first facets
+        walks = not isinstance(target, EmbreeField)
+        sweeps = walks and field.periodic and "sweep" in plan.skips
+        longest = -(-source.n_rays // source.n_lines) if sweeps else 0
+        line = LineRoom(
+            np.empty((longest, N_FIRST)), np.empty((2, longest)),
+            np.empty(longest * N_MIRRORED),
+        )  # fmt: skip
+        if isinstance(target, WetField):
+            places = Room(
+                np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT), line.meetings
+            )
+            trace_among_bodies(
+                target.world, source, field.terrain.z_top, plan.max_bounces,
+                plan.n_stokes, places, bins,
+            )  # fmt: skip
+            continue
+        light = tally.spectra[index] if tally.spectra else NOTHING
+        if sweeps:
+            sweep_batch(
+                field.terrain, source, line, record, waiting, light, plan.optics, bins
+            )
+        else:
+            tree = None if isinstance(target, Field) else target.tree()
+            trace_batch(
+                field.terrain, tree, source, record, waiting, light, plan.optics, bins
+            )
+        if tally.spectra:
+            close_sums(light, plan.n_stokes, bins.lit)
+    return tally
