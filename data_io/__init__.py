@@ -41,3 +41,7 @@ __all__ = [
     "write_profile_overlay",
     "write_result",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -6,19 +6,19 @@ Public names load on first use: importing the package does no work.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-# A module of this name would hide a function loaded on first use
-from fitting.fit import fit
-
 if TYPE_CHECKING:
     from fitting.drops.silhouette import ContactAngle, contact_angle
     from fitting.estimate import Estimate
     from fitting.models.simulated import SimulatedModel
     from fitting.objective.parameters import PARAMETERS
+    from fitting.pipeline import PipelineResult, run_pipeline
+    from fitting.readings import masks
     from fitting.readings.aperture import Aperture
     from fitting.readings.noise import Noise
     from fitting.result.fit_result import FitResult
     from fitting.result.likelihood import LikelihoodProfile, profile_likelihood
     from fitting.result.model_comparison import Comparison, FTest, compare, f_test
+    from fitting.run import fit
     from fitting.statistics.result import SurfaceStatistics
     from fitting.statistics.surface import surface_statistics
 
@@ -32,13 +32,16 @@ __all__ = [
     "FitResult",
     "LikelihoodProfile",
     "Noise",
+    "PipelineResult",
     "SimulatedModel",
     "SurfaceStatistics",
     "compare",
     "contact_angle",
     "f_test",
     "fit",
+    "masks",
     "profile_likelihood",
+    "run_pipeline",
     "surface_statistics",
 ]
 
@@ -46,6 +49,8 @@ _MODULES = {
     "readings.aperture": ("Aperture",),
     "drops.silhouette": ("ContactAngle", "contact_angle"),
     "estimate": ("Estimate",),
+    "pipeline": ("PipelineResult", "run_pipeline"),
+    "run": ("fit",),
     "result.likelihood": ("LikelihoodProfile", "profile_likelihood"),
     "result.model_comparison": ("Comparison", "FTest", "compare", "f_test"),
     "readings.noise": ("Noise",),
@@ -59,7 +64,13 @@ _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
+    if name == "masks":
+        return import_module("fitting.readings.masks")
     if name not in _HOME:
         msg = f"module {__name__!r} has no attribute {name!r}"
         raise AttributeError(msg)
     return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fitting.fit import fit
-from fitting.models.plane_curves import plane_curves
+from fitting.models.cuts import plane_curves
 from fitting.models.simulated import SimulatedModel
 from fitting.readings.observations import Mask
 from fitting.result.fit_result import FitResult
+from fitting.run import fit
 from fitting.statistics.result import SurfaceStatistics
 from fitting.statistics.surface import surface_statistics
 from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pbrdf import materials
     from pbrdf.analytic import MicrofacetModel
     from pbrdf.contaminants import Drops, Film, Spheres
+    from pbrdf.dew import compare_dew
     from pbrdf.errors import AccuracyWarning, DataFileError
     from pbrdf.observation.run import observe
     from pbrdf.optics.materials import Material
@@ -32,6 +33,7 @@ __all__ = [
     "MicrofacetModel",
     "Scene",
     "Spheres",
+    "compare_dew",
     "load_scene",
     "materials",
     "observe",
@@ -50,6 +52,7 @@ _HOME = {
     "MicrofacetModel": "pbrdf.analytic",
     "Scene": "pbrdf.scene.scene",
     "Spheres": "pbrdf.contaminants",
+    "compare_dew": "pbrdf.dew",
     "load_scene": "pbrdf.scene.read",
     "observe": "pbrdf.observation.run",
     "simulate": "pbrdf.simulation.run",

@@ -4,8 +4,11 @@ Imports inside functions count too: a lazy import is still a dependency.
 """
 
 import ast
+import importlib
 import subprocess
 import sys
+from collections import Counter
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -87,7 +90,7 @@ def test_kernels_know_numbers_and_each_other_only(source: Path) -> None:
 def test_the_rule_sees_a_crossing() -> None:
     source = ROOT / "pbrdf/surface/__init__.py"
     assert forbidden(source) == ("fitting", "data_io", "pbrdf.cli")
-    assert under("fitting.fit.fit", *forbidden(source))
+    assert under("fitting.run.fit", *forbidden(source))
     assert not under("fittings", *forbidden(source))
 
 
@@ -113,3 +116,59 @@ def test_importing_does_no_heavy_work(package: str, heavy: list[str]) -> None:
         check=True,
     )
     assert run.stdout.split() == []
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_dir_shows_the_public_names_and_each_is_there(package: str) -> None:
+    door = importlib.import_module(package)
+    assert dir(door) == sorted(door.__all__)
+    assert all(getattr(door, name) is not None for name in dir(door))
+
+
+def test_rooms_stay_small() -> None:
+    rooms = Counter(source.parent for source in MODULES)
+    crowded = {str(room.relative_to(ROOT)): n for room, n in rooms.items() if n > 15}
+    assert not crowded
+
+
+def edges() -> dict[str, set[str]]:
+    """Who imports whom, module by module, imports inside functions included."""
+    names = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(
+            ".__init__"
+        ): path
+        for path in MODULES
+    }
+    found = {}
+    for name, path in names.items():
+        ends = set()
+        for target in imported(path):
+            while target and target not in names:
+                target = target.rpartition(".")[0]
+            ends.add(target)
+        found[name] = ends - {name, ""}
+    return found
+
+
+def test_imports_run_in_no_circle() -> None:
+    """A face names what its room holds without being part of any way round."""
+    arrows = {
+        name: {end for end in ends if not (ROOT / end.replace(".", "/")).is_dir()}
+        for name, ends in edges().items()
+        if not (ROOT / name.replace(".", "/")).is_dir()
+    }
+    try:
+        tuple(TopologicalSorter(arrows).static_order())
+    except CycleError as error:
+        pytest.fail(f"circle: {' -> '.join(error.args[1])}")
+
+
+def test_no_module_is_named_like_a_function_in_it() -> None:
+    """`import fitting.fit` would give the function or the module, by who came first."""
+    hidden = [
+        str(path.relative_to(ROOT))
+        for path in MODULES
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == path.stem
+    ]
+    assert not hidden

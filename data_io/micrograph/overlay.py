@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io.micrograph.edge_profile import EdgeProfile
+from data_io.micrograph.edge import EdgeProfile
 from data_io.micrograph.levels import load_grey
 
 GOOD, POOR, OVERHANG = np.array([[0.1, 0.9, 0.2], [1.0, 0.1, 0.1], [1.0, 0.2, 1.0]])

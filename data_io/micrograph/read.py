@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from data_io.micrograph import bodies
-from data_io.micrograph.edge_profile import EdgeProfile, edge_profile
+from data_io.micrograph.edge import EdgeProfile, edge_profile
 from data_io.micrograph.edges import picture_pixels, trace
 from data_io.micrograph.levels import find_annotation_band, load_grey
 from data_io.micrograph.overlay import write_profile_overlay

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
-from data_io.micrograph.edge_profile import MIN_QUALITY
+from data_io.micrograph.edge import MIN_QUALITY
 from data_io.micrograph.edges import Trace
 from data_io.micrograph.levels import Levels, flatten
 from pbrdf.errors import DataFileError

@@ -15,23 +15,48 @@ References
 .. [2] G. J. Feldman, R. D. Cousins, Phys. Rev. D 57, 3873 (1998), section IV B.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from scipy import optimize, special
 
 from fitting.objective.parameters import Parameter
-
-if TYPE_CHECKING:
-    from fitting.result.fit_result import FitResult
+from fitting.problem.problem import Problem
 
 __all__ = ["LikelihoodProfile", "allowed_rise", "profile_likelihood"]
 
 # Doublings of the step outwards before a side is called open
 _REACH = 12
+
+
+class Fitted(Protocol):
+    """What a profile needs of a `FitResult`."""
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Best values by parameter name."""
+
+    @property
+    def stderr(self) -> Mapping[str, float]:
+        """Standard errors by parameter name."""
+
+    @property
+    def problem(self) -> Problem:
+        """What was solved."""
+
+    @property
+    def status(self) -> str:
+        """Why the solver stopped."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether there is a minimum."""
+
+    def quantile(self, level: float) -> float:
+        """Half width of an interval in standard errors."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,7 +101,7 @@ class LikelihoodProfile:
 
 
 def profile_likelihood(
-    result: "FitResult", name: str, *, level: float = 0.95
+    result: Fitted, name: str, *, level: float = 0.95
 ) -> LikelihoodProfile:
     """Return the likelihood interval of one fitted parameter.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from fitting.objective.objective import Objective, Prediction
 from fitting.solvers.descent import descend
-from fitting.solvers.newton import newton
+from fitting.solvers.newton_steps import newton
 from fitting.solvers.solution import Solution, better, early_end
 
 if TYPE_CHECKING:

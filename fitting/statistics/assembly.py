@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fitting.estimate import Estimate
-from fitting.statistics.axis import height_rms
-from fitting.statistics.axis_fit import AxisFit
+from fitting.statistics.axis.estimate import height_rms
+from fitting.statistics.axis.fit import AxisFit
+from fitting.statistics.axis.parts import AxisStatistics, PlainStatistics
+from fitting.statistics.axis.scatter import mean_power_of_correlation
 from fitting.statistics.gaussianity import judge_gaussianity
-from fitting.statistics.parts import AxisStatistics, PlainStatistics
 from fitting.statistics.result import SurfaceStatistics
-from fitting.statistics.scatter import mean_power_of_correlation
 from fitting.statistics.texture import measure_anisotropy
 from fitting.statistics.warnings import Findings, warnings_for
 

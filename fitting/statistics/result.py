@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fitting.estimate import Estimate
+from fitting.statistics.axis.parts import Autocorrelation, AxisStatistics, PlainStatistics
+from fitting.statistics.axis.spectrum import PowerSpectrum, SlopeBands, line_spectrum
 from fitting.statistics.gaussianity import Gaussianity
 from fitting.statistics.histogram import Histogram, make_histogram
-from fitting.statistics.parts import Autocorrelation, AxisStatistics, PlainStatistics
-from fitting.statistics.spectrum import PowerSpectrum, SlopeBands, line_spectrum
+from fitting.statistics.random_surface import gaussian_surface, measured_surface
 from fitting.statistics.texture import Anisotropy
 
 if TYPE_CHECKING:
@@ -194,16 +195,47 @@ class SurfaceStatistics:
         ValueError
             If the measurement failed (`reliable` is False) or `kind` is unknown.
         """
-        from fitting.statistics.random_surface import gaussian_surface, measured_surface
-
         if kind == "gaussian":
-            return gaussian_surface(self, shape, spacing)
+            return gaussian_surface(
+                shape,
+                spacing,
+                corr_length=self._lengths(),
+                slope_rms=self._known("slope_rms"),
+            )
         if kind == "measured":
-            return measured_surface(self, shape, spacing)
+            # The form is that of the steeper axis; its length is measured along both
+            steeper = max(self.axes, key=lambda axis: axis.slope_rms.value)
+            return measured_surface(
+                shape,
+                spacing,
+                corr_length=self._lengths(),
+                height_rms=self._known("height_rms"),
+                correlation=steeper.fit.correlation,
+                heights=None if self.gaussianity.is_gaussian else self.residual,
+            )
         msg = (
             f"kind must be one of gaussian, measured, got {kind!r}. For the measured "
             "heights themselves use the HeightMap."
         )
+        raise ValueError(msg)
+
+    def _lengths(self) -> float | tuple[float, float]:
+        """Return one length, or those of x and y where they differ beyond chance.
+
+        A profile is taken as a cut of an isotropic surface.
+        """
+        if len(self.axes) == 1:
+            return self.corr_length.value
+        x, y = (axis.corr_length for axis in self.axes)
+        if max(x.low, y.low) < min(x.high, y.high):
+            return self.corr_length.value
+        return x.value, y.value
+
+    def _known(self, name: str) -> float:
+        """Return the value of an estimate, which a failed measurement does not have."""
+        if self.reliable:
+            return float(getattr(self, name).value)
+        msg = f"{name} must be determined, got a failed measurement: {self.warnings[0]}"
         raise ValueError(msg)
 
     def estimates(self) -> dict[str, tuple[Estimate, str]]:

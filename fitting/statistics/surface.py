@@ -7,10 +7,17 @@ from typing import Protocol, TypeGuard
 import numpy as np
 
 from fitting.statistics.assembly import assemble
-from fitting.statistics.autocorrelation import GAUSSIAN
-from fitting.statistics.axis import axis_statistics
-from fitting.statistics.axis_fit import AxisData
-from fitting.statistics.axis_problem import fit_axis
+from fitting.statistics.axis.autocorrelation import GAUSSIAN
+from fitting.statistics.axis.estimate import axis_statistics
+from fitting.statistics.axis.fit import AxisData
+from fitting.statistics.axis.problem import fit_axis
+from fitting.statistics.axis.rounding import find_step, is_negligible
+from fitting.statistics.axis.scatter import form_losses, mean_power_of_correlation
+from fitting.statistics.axis.structure_function import (
+    Sampling,
+    line_sampling,
+    profile_sampling,
+)
 from fitting.statistics.form import (
     FORMS,
     Form,
@@ -19,9 +26,6 @@ from fitting.statistics.form import (
     remove_form_profile,
 )
 from fitting.statistics.result import SurfaceStatistics
-from fitting.statistics.rounding import find_step, is_negligible
-from fitting.statistics.scatter import form_losses, mean_power_of_correlation
-from fitting.statistics.structure_function import Sampling, line_sampling, profile_sampling
 
 Array = np.ndarray
 
@@ -82,7 +86,7 @@ def surface_statistics(
     -----
     The structure function D(r) = ⟨(z(x + r) - z(x))²⟩ up to 1.5 correlation lengths and the
     mean square height are fitted together by a model autocorrelation, white noise and the
-    closed-form effect of rounding (see `fitting.statistics.rounding`), weighted by
+    closed-form effect of rounding (see `fitting.statistics.axis.rounding`), weighted by
     their theoretical covariance. That covariance, which counts independent correlation
     lengths, gives the intervals. A Gaussian autocorrelation is kept unless the data reject
     it for a Matérn form or two scales.

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fitting.estimate import Estimate
+from fitting.statistics.axis.parts import AxisStatistics
 from fitting.statistics.gaussianity import Gaussianity
-from fitting.statistics.parts import AxisStatistics
 from fitting.statistics.texture import Anisotropy
 
 

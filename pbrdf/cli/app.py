@@ -7,21 +7,15 @@ import os
 import re
 import sys
 import warnings
-from collections.abc import Sequence
-from typing import Annotated
+from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Annotated, Any
 
 import typer
 
 from pbrdf import __version__
-from pbrdf.cli.dew import dew
-from pbrdf.cli.export import export
-from pbrdf.cli.fit import fit
-from pbrdf.cli.observe import observe
-from pbrdf.cli.pipeline import pipeline
-from pbrdf.cli.plot import plot
-from pbrdf.cli.simulate import simulate
-from pbrdf.cli.statistics import statistics
-from pbrdf.cli.sweep import sweep
+from pbrdf.cli import measuring, predicting, showing
 
 __all__ = ["app", "main"]
 
@@ -56,9 +50,17 @@ def _options(
     """Polarised reflectance of real rough surfaces: measured, simulated and fitted."""
 
 
-COMMANDS = (pipeline, statistics, fit, simulate, observe, sweep, plot, export, dew)
-for function in COMMANDS:
-    app.command()(function)
+def _commands() -> Iterator[tuple[str, Callable[..., Any]]]:
+    """Name and function of every command: each module of a room of commands holds one."""
+    for room in (measuring, predicting, showing):
+        for module in iter_modules(room.__path__):
+            command = import_module(f"{room.__name__}.{module.name}").command
+            yield module.name.replace("_", "-"), command
+
+
+COMMANDS = dict(_commands())
+for name, function in COMMANDS.items():
+    app.command(name)(function)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -118,8 +120,7 @@ def _usage(error: typer.TyperException, arguments: Sequence[str]) -> str:
     if option and option[1] in arguments[:-1]:
         value = arguments[arguments.index(option[1]) + 1]
         sentence = f"{sentence.rstrip('.')}, got {value!r}."
-    commands = {function.__name__ for function in COMMANDS}
-    name = next((f"{word} " for word in arguments if word in commands), "")
+    name = next((f"{word} " for word in arguments if word in COMMANDS), "")
     return f"{sentence} See `pbrdf {name}--help`."
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrdf.contaminants import population
-from pbrdf.contaminants.breath_figure import breath_figure, merge
+from pbrdf.contaminants.condensation import breath_figure, merge
 from pbrdf.contaminants.ground import Ground, Rest
 from pbrdf.contaminants.sessile import ShapeMaker
 from pbrdf.contaminants.shapes import Shape, contact_depth

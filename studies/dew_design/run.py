@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from pbrdf import GaussianSurface, Material
-from pbrdf.cli.dew import rows
 from pbrdf.cli.dew_figures import COLOURS
+from pbrdf.cli.predicting.dew import rows
 from pbrdf.dew import REGIONS, compare_dew
 
 HERE = Path(__file__).parent

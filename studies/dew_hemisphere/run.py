@@ -7,8 +7,8 @@ from time import perf_counter
 import numpy as np
 
 from pbrdf import GaussianSurface, Material
-from pbrdf.cli.dew import table
 from pbrdf.cli.dew_figures import polar_figure
+from pbrdf.cli.predicting.dew import table
 from pbrdf.dew import compare_dew
 
 HERE = Path(__file__).parent

@@ -14,11 +14,11 @@ import numpy as np
 import xarray as xr
 
 import data_io
-from fitting.fit import fit
-from fitting.models.plane_curves import plane_curves
+from fitting.models.cuts import plane_curves
 from fitting.pipeline import PipelineResult, run_pipeline
 from fitting.report.figures import new_figure, scan_figure
 from fitting.result.fit_result import FitResult
+from fitting.run import fit
 from pbrdf import Material, MicrofacetModel
 
 HERE = Path(__file__).parent

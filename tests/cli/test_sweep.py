@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import pbrdf
 from data_io import read_result
 from pbrdf.cli import main
-from pbrdf.cli.sweep import OF_CONTAMINANTS, VARIED, changed
+from pbrdf.cli.predicting.sweep import OF_CONTAMINANTS, VARIED, changed
 
 SCENE = """
 [surface]

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import Drops, GaussianSurface, HeightMap, Material, Spheres
 from pbrdf.contaminants import place
-from pbrdf.contaminants.breath_figure import (
+from pbrdf.contaminants.condensation import (
     breath_figure,
     coalesce,
     contact_distance,

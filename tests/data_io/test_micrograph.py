@@ -20,7 +20,7 @@ from data_io import (
     write_profile_overlay,
 )
 from data_io.micrograph.levels import _border_width
-from data_io.micrograph.restore import restore
+from data_io.micrograph.restoration import restore
 from examples.micrograph import Camera, Edge, gaussian_edge, photograph
 from fitting import surface_statistics
 from pbrdf.errors import DataFileError

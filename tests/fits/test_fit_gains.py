@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from scipy import optimize
 
 from fitting.estimate import Estimate
-from fitting.fit import fit
 from fitting.readings.noise import Noise
+from fitting.run import fit
 from pbrdf import Material, MicrofacetModel
 from tests.fits.scans import VINYL, scan
 

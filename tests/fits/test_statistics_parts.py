@@ -5,24 +5,24 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import integrate, special
 
-from fitting.statistics.autocorrelation import (
+from fitting.statistics.axis.autocorrelation import (
     gaussian,
     matern,
     multi_scale,
     periodic,
     two_scale,
 )
-from fitting.statistics.form import form_degree, remove_form_map, remove_form_profile
-from fitting.statistics.gaussianity import judge_gaussianity
-from fitting.statistics.rounding import Rounding, find_step
-from fitting.statistics.scatter import (
+from fitting.statistics.axis.rounding import Rounding, find_step
+from fitting.statistics.axis.scatter import (
     Extent,
     form_losses,
     form_scatter,
     increment_covariance,
 )
-from fitting.statistics.spectrum import line_spectrum
-from fitting.statistics.structure_function import line_sampling, profile_sampling
+from fitting.statistics.axis.spectrum import line_spectrum
+from fitting.statistics.axis.structure_function import line_sampling, profile_sampling
+from fitting.statistics.form import form_degree, remove_form_map, remove_form_profile
+from fitting.statistics.gaussianity import judge_gaussianity
 
 FORMS = [
     gaussian(3.7),

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from scipy import linalg
 
-from fitting.statistics.autocorrelation import Correlation
+from fitting.statistics.axis.autocorrelation import Correlation
 
 Array = np.ndarray
 

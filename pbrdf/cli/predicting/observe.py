@@ -32,7 +32,7 @@ class Start(StrEnum):
     source = "source"
 
 
-def observe(
+def command(
     scene: Annotated[Path, typer.Argument(help="Scene file (TOML).", show_default=False)],
     scan: Annotated[
         Path | None,

@@ -25,7 +25,7 @@ class Direction(StrEnum):
     vertical = "vertical"
 
 
-def statistics(
+def command(
     surface: options.Surface,
     kind: options.KindOption = Kind.auto,
     um_per_pixel: options.UmPerPixel = None,

@@ -30,7 +30,7 @@ OF_CONTAMINANTS = (
 NAMES = (*VARIED, *OF_CONTAMINANTS)
 
 
-def sweep(
+def command(
     scene: Annotated[Path, typer.Argument(help="Scene file (TOML).", show_default=False)],
     vary: Annotated[
         list[str],

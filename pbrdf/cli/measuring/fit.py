@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pbrdf import MicrofacetModel
 
 
-def fit(
+def command(
     scans: Annotated[
         list[Path],
         typer.Argument(
@@ -81,8 +81,8 @@ def fit(
         msg = "scans must have names of their own, got two files of one name. Rename one."
         raise ValueError(msg)
 
-    from fitting.fit import fit as fit_model
     from fitting.readings.masks import blocked_detector, zeros
+    from fitting.run import fit as fit_model
 
     with progress_bar("tracing") as progress:
         model: MicrofacetModel | SimulatedModel
@@ -167,7 +167,7 @@ def _write(result: "FitResult", measured: "Mapping[str, xr.Dataset]", folder: Pa
     import numpy as np
 
     from data_io import in_plane, write_model
-    from fitting.models.plane_curves import plane_curves
+    from fitting.models.cuts import plane_curves
     from fitting.report.figures import scan_figure
 
     text = json.dumps(result.as_dict(), indent=2)

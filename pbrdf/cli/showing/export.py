@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def export(
+def command(
     source: Annotated[
         Path, typer.Argument(help="Result (.nc) or model (.toml).", show_default=False)
     ],

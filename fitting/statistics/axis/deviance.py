@@ -9,9 +9,9 @@ deviance over the correlation length weighs each length by its own covariance.
 import numpy as np
 from scipy import optimize
 
-from fitting.statistics.autocorrelation import GAUSSIAN
-from fitting.statistics.axis_fit import AxisData, AxisFit
-from fitting.statistics.axis_problem import AxisProblem, Start
+from fitting.statistics.axis.autocorrelation import GAUSSIAN
+from fitting.statistics.axis.fit import AxisData, AxisFit
+from fitting.statistics.axis.problem import AxisProblem, Start
 
 # Relative error of the slope from which first order is not trusted
 POOR = 0.25

@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import optimize
 
-from fitting.statistics.autocorrelation import (
+from fitting.statistics.axis.autocorrelation import (
     FAMILIES,
     GAUSSIAN,
     Correlation,
     Family,
     multi_scale_family,
 )
-from fitting.statistics.axis_fit import AxisData, AxisFit, jacobian
-from fitting.statistics.rounding import Rounding
-from fitting.statistics.scatter import (
+from fitting.statistics.axis.fit import AxisData, AxisFit, jacobian
+from fitting.statistics.axis.rounding import Rounding
+from fitting.statistics.axis.scatter import (
     Extent,
     form_losses,
     form_scatter,

@@ -6,13 +6,13 @@ import numpy as np
 from scipy import special
 
 from fitting.estimate import Estimate
-from fitting.statistics.admitted_ends import POOR, admitted_ends
-from fitting.statistics.axis_fit import AxisData, AxisFit, jacobian
-from fitting.statistics.axis_problem import fit_axis
-from fitting.statistics.parts import Autocorrelation, AxisStatistics
-from fitting.statistics.scatter import increment_covariance, mean_power_of_correlation
-from fitting.statistics.spectrum import measured_cutoff
-from fitting.statistics.structure_function import Increments
+from fitting.statistics.axis.deviance import POOR, admitted_ends
+from fitting.statistics.axis.fit import AxisData, AxisFit, jacobian
+from fitting.statistics.axis.parts import Autocorrelation, AxisStatistics
+from fitting.statistics.axis.problem import fit_axis
+from fitting.statistics.axis.scatter import increment_covariance, mean_power_of_correlation
+from fitting.statistics.axis.spectrum import measured_cutoff
+from fitting.statistics.axis.structure_function import Increments
 
 Array = np.ndarray
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fitting.estimate import Estimate
-from fitting.statistics.axis_fit import AxisFit
+from fitting.statistics.axis.fit import AxisFit
 
 Array = np.ndarray
 

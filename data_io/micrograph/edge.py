@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import binary_erosion, label
 
 from data_io.micrograph.edges import Trace
-from data_io.micrograph.restore import Restored, restore
+from data_io.micrograph.restoration import Restored, restore
 from data_io.topography.profile import Profile
 
 # Columns less like a step than this are left out

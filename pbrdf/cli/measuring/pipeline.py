@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from fitting.pipeline import PipelineResult
 
 
-def pipeline(
+def command(
     surface: options.Surface,
     scan: options.Scan,
     n: options.Index,

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 VARIABLES = ("signature", "signature_stderr", "added", "added_stderr")
 
 
-def dew(
+def command(
     contact_angles: Annotated[
         str, typer.Option("--contact-angles-deg", help="Contact angles, by commas.")
     ] = "15,90,179",

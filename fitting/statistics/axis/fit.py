@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fitting.statistics.autocorrelation import Correlation, Family
-from fitting.statistics.scatter import Extent
-from fitting.statistics.structure_function import Increments, Sampling
+from fitting.statistics.axis.autocorrelation import Correlation, Family
+from fitting.statistics.axis.scatter import Extent
+from fitting.statistics.axis.structure_function import Increments, Sampling
 
 Array = np.ndarray
 

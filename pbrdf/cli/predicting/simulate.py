@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def simulate(
+def command(
     scene: Annotated[Path, typer.Argument(help="Scene file (TOML).", show_default=False)],
     theta_i: options.Incidences = "30",
     phi_i: options.Azimuths = "0",

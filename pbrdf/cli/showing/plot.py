@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 HEMISPHERE = ("theta_i", "theta_s", "dphi", "stokes_out", "stokes_in")
 
 
-def plot(
+def command(
     source: Annotated[
         Path,
         typer.Argument(help="Result (.nc) or goniometer file.", show_default=False),

@@ -1,0 +1,1 @@
+"""Statistics along one axis: structure function, autocorrelation, rounding, scatter."""

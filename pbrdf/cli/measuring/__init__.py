@@ -1,0 +1,1 @@
+"""Commands that measure and fit: one module each, named like its command."""

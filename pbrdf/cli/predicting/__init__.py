@@ -1,0 +1,1 @@
+"""Commands that predict: one module each, named like its command."""

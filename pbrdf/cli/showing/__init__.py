@@ -1,0 +1,1 @@
+"""Commands that show and hand over: one module each, named like its command."""
