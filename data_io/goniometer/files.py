@@ -6,7 +6,8 @@ from pathlib import Path
 import xarray as xr
 
 from data_io.goniometer import fred, nist, own_csv, spacecraft, zemax
-from data_io.goniometer.scan import QUANTITIES, Scan, to_dataset
+from data_io.goniometer.dataset import to_dataset
+from data_io.goniometer.scan import QUANTITIES, Scan
 from data_io.text.text import Line, is_comment, read_lines
 from pbrdf.errors import DataFileError
 
@@ -34,8 +35,11 @@ def read_goniometer(path: str | Path, format: str | None = None) -> xr.Dataset:
     -------
     xarray.Dataset
         One dimension `geometry`. Coordinates theta_i, theta_s, dphi [rad] and, where the
-        file names it, wavelength [um]; variables M00..M33 [1/sr], DOLP [1] and
-        ``<name>_stderr`` as the file has them. NaN where nothing was measured.
+        file names them, wavelength [um], phi_i, source_half_angle and detector_half_angle
+        [rad]; variables M00..M33 [1/sr], m01..m33 (divided by M00) [1], DOLP [1], I_s, I_p,
+        f_ss..f_pp [1/sr] and ``<name>_stderr`` as the file has them. NaN where nothing was
+        measured. The attribute `quantity` is "brdf", or "relative" where all but the ratios
+        have one unknown factor in common.
 
     Raises
     ------

@@ -2,7 +2,9 @@
 
 A block starts with a line of two numbers, theta_i and phi_i; lines of three numbers follow,
 theta_s, phi_s and the BRDF. phi_i is the azimuth in which the incident light travels, so
-phi_s = phi_i is forward and dphi = phi_s - phi_i + 180 degrees.
+phi_s = phi_i is forward and dphi = phi_s - phi_i + 180 degrees. Where a file has sources at
+several azimuths they are kept as phi_i: the sample's own x axis is then half a turn from
+the file's.
 """
 
 import re
@@ -60,6 +62,7 @@ def read(path: Path, lines: list[Line]) -> Scan:
         theta_s=theta_s,
         dphi=np.mod(phi_s - phi_i + 180.0, 360.0),
         values={"M00": brdf * float(options["scale"])},
+        phi_i=np.mod(phi_i, 360.0) if phi_i.any() else None,
         names={"dphi": "phi_s", "M00": "brdf"},
         attrs={"format": "fred", "title": path.stem},
     )

@@ -13,13 +13,28 @@ from data_io.text.write import complete_file
 from pbrdf.errors import DataFileError
 
 GEOMETRY = ("theta_i_deg", "theta_s_deg", "dphi_deg", "theta_view_deg")
+OPTIONAL = ("phi_i_deg", "source_half_angle_deg", "detector_half_angle_deg")
 WAVELENGTHS = {"wavelength_um": 1.0, "wavelength_nm": 1e-3}
-KNOWN = (*GEOMETRY, *WAVELENGTHS, *QUANTITIES, *(name + STDERR for name in QUANTITIES))
-_VALUE_NAMES = set(KNOWN) - set(GEOMETRY) - set(WAVELENGTHS)
+KNOWN = (
+    *GEOMETRY,
+    *OPTIONAL,
+    *WAVELENGTHS,
+    *QUANTITIES,
+    *(name + STDERR for name in QUANTITIES),
+)
+_VALUE_NAMES = set(KNOWN) - set(GEOMETRY) - set(OPTIONAL) - set(WAVELENGTHS)
+_QUANTITY = re.compile(r"quantity\s*[:=]\s*(\S+)")
+
+# What `write` notes in the file, and `read` need not keep;
+NOTES = (
+    "Angles in degrees, dphi = phi_s - phi_i, specular at dphi = 180",
+    *CONVENTIONS.split(". ")[1:],
+)
 
 _COLUMNS_CURE = (
     "Columns: theta_i_deg; theta_view_deg or theta_s_deg and dphi_deg; M00..M33, DOLP; "
-    "<name>_stderr; wavelength_um."
+    "m01..m33 (divided by M00), I_s, I_p; <name>_stderr; wavelength_um; phi_i_deg; "
+    "source_half_angle_deg, detector_half_angle_deg."
 )
 
 
@@ -40,7 +55,7 @@ def read(path: Path, lines: list[Line]) -> Scan:
     table = _table(path, names, content[1:])
     numbers = [line.number for line in content[1:]]
     columns = {name: table[:, i] for i, name in enumerate(names)}
-    for name in (*GEOMETRY, *WAVELENGTHS):
+    for name in (*GEOMETRY, *OPTIONAL, *WAVELENGTHS):
         if name in columns and np.isnan(columns[name]).any():
             row = int(np.argmax(np.isnan(columns[name])))
             problem = "expected a number in every row, got an empty cell or nan"
@@ -49,7 +64,11 @@ def read(path: Path, lines: list[Line]) -> Scan:
     theta_s, dphi, view_name = _view(path, columns, numbers)
     wavelength = next((name for name in WAVELENGTHS if name in columns), None)
     # The notes that `write` adds need not pile up
-    kept = [text for text in comments if text and text not in CONVENTIONS]
+    kept = [
+        text
+        for text in comments
+        if text and not _noted(text) and not _QUANTITY.fullmatch(text)
+    ]
     return Scan(
         path=path,
         lines=numbers,
@@ -60,11 +79,16 @@ def read(path: Path, lines: list[Line]) -> Scan:
         wavelength=None
         if wavelength is None
         else columns[wavelength] * WAVELENGTHS[wavelength],
+        phi_i=columns.get("phi_i_deg"),
+        source_half_angle=columns.get("source_half_angle_deg"),
+        detector_half_angle=columns.get("detector_half_angle_deg"),
+        quantity=_quantity(path, comments),
         names={
             "theta_i": "theta_i_deg",
             "theta_s": view_name,
             "dphi": "dphi_deg",
             "wavelength": wavelength or "",
+            **{name.removesuffix("_deg"): name for name in OPTIONAL},
         },
         attrs={
             "format": "csv",
@@ -72,6 +96,20 @@ def read(path: Path, lines: list[Line]) -> Scan:
             "comments": "\n".join(kept),
         },
     )
+
+
+def _noted(text: str) -> bool:
+    """Tell whether a comment is one that `write` adds, now or in earlier versions."""
+    return text in NOTES or text.startswith(("Angles in rad, dphi", "M in 1/sr without"))
+
+
+def _quantity(path: Path, comments: list[str]) -> str:
+    """Return what a comment such as "quantity: relative" declares."""
+    found = [match[1] for text in comments if (match := _QUANTITY.fullmatch(text))]
+    if found and found[0] not in ("brdf", "relative"):
+        problem = f"expected 'quantity: brdf' or 'quantity: relative', got {found[0]!r}"
+        raise DataFileError(path, problem, "Mend the comment.")
+    return found[0] if found else "brdf"
 
 
 def _column_names(path: Path, header: Line) -> list[str]:
@@ -178,21 +216,39 @@ def _view(
 def write(dataset: xr.Dataset, path: str | Path) -> None:
     """Write a goniometer dataset; see `data_io.write_goniometer`."""
     columns = {
-        "theta_i_deg": np.degrees(dataset["theta_i"].to_numpy()),
-        "theta_s_deg": np.degrees(dataset["theta_s"].to_numpy()),
-        "dphi_deg": np.degrees(dataset["dphi"].to_numpy()),
+        f"{name}_deg": degrees(dataset[name]) for name in ("theta_i", "theta_s", "dphi")
     }
+    shape = columns["dphi_deg"].shape
+    for name in OPTIONAL:
+        angle = name.removesuffix("_deg")
+        if angle in dataset.variables:
+            columns[name] = np.broadcast_to(degrees(dataset[angle]), shape)
     if "wavelength" in dataset.coords:
-        wavelength = dataset["wavelength"].to_numpy()
-        columns["wavelength_um"] = np.broadcast_to(wavelength, columns["dphi_deg"].shape)
+        columns["wavelength_um"] = np.broadcast_to(dataset["wavelength"].to_numpy(), shape)
     columns |= {name: dataset[name].to_numpy() for name in KNOWN if name in dataset}
-    comments = [
-        *str(dataset.attrs.get("comments", "")).splitlines(),
-        *CONVENTIONS.split(". "),
-    ]
+    comments = [*str(dataset.attrs.get("comments", "")).splitlines(), *NOTES]
+    if dataset.attrs.get("quantity", "brdf") != "brdf":
+        comments.append(f"quantity: {dataset.attrs['quantity']}")
     with complete_file(path) as temporary, temporary.open("w", encoding="utf-8") as stream:
         stream.writelines(f"# {text}\n" for text in comments)
         stream.write(",".join(columns) + "\n")
         for row in zip(*(values.tolist() for values in columns.values()), strict=True):
             # repr keeps every digit; an empty cell is what was not measured
             stream.write(",".join("" if x != x else repr(x) for x in row) + "\n")
+
+
+def degrees(angle: xr.DataArray) -> np.ndarray:
+    """Return an angle in degrees, without the last digits that radians put there.
+
+    29.999999999999996 becomes 30: both are the same angle in radians, to rounding.
+
+    Examples
+    --------
+    >>> degrees(xr.DataArray(np.radians([30.0, 41.4]))).tolist()
+    [30.0, 41.4]
+    """
+    radians = angle.to_numpy()
+    exact = np.degrees(radians)
+    short = np.round(exact, 10)
+    same = np.abs(np.radians(short) - radians) <= np.spacing(np.abs(radians))
+    return np.where(same, short, exact)

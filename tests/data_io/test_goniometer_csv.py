@@ -141,7 +141,7 @@ FULL = "theta_i_deg,theta_s_deg,dphi_deg,M00"
         (f"{VIEW.replace(',', ';')}\n30;10;1\n", "line 1: expected columns separated by commas, got ';'"),
         (f"{VIEW.replace(',', ' ')}\n30 10 1\n", "line 1: expected columns separated by commas, got ' '"),
         ("theta_i,theta_view_deg,M00\n30,10,1\n", "line 1: .*'theta_i'. Did you mean theta_i_deg"),
-        (f"{VIEW},m10\n30,10,1,0\n", "expected a known column, got 'm10'"),
+        (f"{VIEW},m1o\n30,10,1,0\n", "expected a known column, got 'm1o'"),
         (f"{VIEW},M00\n30,10,1,1\n", "line 1, column M00: expected one column of this name, found 2"),
         ("theta_view_deg,M00\n10,1\n", "column theta_i_deg: expected this column, found none"),
         ("theta_i_deg,M00\n10,1\n", "column theta_s_deg: expected this column"),
@@ -209,6 +209,58 @@ def test_a_truncated_file_is_refused_or_shorter_by_whole_rows(tmp_path, cut):
         return
     # What is left of the last number may pass for a number; nothing else may
     assert kept.count("\n") <= scan.sizes["geometry"] + 1
+
+
+def test_azimuths_of_the_source_cones_and_ratios_make_the_round_trip(tmp_path):
+    text = (
+        "# quantity: relative\n"
+        "theta_i_deg,phi_i_deg,theta_s_deg,dphi_deg,source_half_angle_deg,"
+        "detector_half_angle_deg,M00,m10,m10_stderr,I_s\n"
+        "30,0,20,180,0.5,1.25,3,0.25,0.01,2\n30,90,20,180,0.5,1.25,7,-0.5,0.02,4\n"
+        "30,90,20,181.5,0.5,1.5,8,0.1,0.03,5\n"
+    )
+    scan = read_goniometer(write(tmp_path, text))
+    assert scan.sizes == {"geometry": 3}
+    assert_allclose(np.degrees(scan.phi_i), [0, 90, 90])
+    assert_allclose(np.degrees(scan.detector_half_angle), [1.25, 1.25, 1.5])
+    assert scan.attrs["quantity"] == "relative"
+    assert scan.M00.attrs["units"] == scan.m10.attrs["units"] == "1"
+    write_goniometer(scan, tmp_path / "again.csv")
+    again = read_goniometer(tmp_path / "again.csv")
+    xr.testing.assert_equal(again, scan)
+    assert again.attrs["quantity"] == "relative"
+
+
+def test_angles_are_written_as_they_were_set(tmp_path):
+    degrees = np.concatenate([np.arange(0.0, 90.0, 0.5), [41.4, 17.0625]])
+    rows = "".join(f"{angle},{angle / 2},{2 * angle},1\n" for angle in degrees)
+    write_goniometer(
+        read_goniometer(write(tmp_path, f"{FULL}\n{rows}")), tmp_path / "2.csv"
+    )
+    lines = (tmp_path / "2.csv").read_text().splitlines()
+    assert lines[0].startswith("# Angles in degrees")
+    body = [line for line in lines if not line.startswith("#")][1:]
+    assert [line.split(",")[:3] for line in body] == [
+        [repr(float(v)) for v in (angle, angle / 2, 2 * angle)] for angle in degrees
+    ]
+
+
+def test_readings_below_zero_within_their_noise_are_kept(tmp_path):
+    text = (
+        "theta_i_deg,theta_view_deg,M00,M00_stderr\n30,10,1,0.01\n30,60,-0.00019,0.0002\n"
+    )
+    assert float(read_goniometer(write(tmp_path, text)).M00[1]) == -0.00019
+    with pytest.raises(DataFileError, match=r"got -0.00019.*give it as M00_stderr"):
+        read_goniometer(write(tmp_path, text.replace("0.0002", "0.00003")))
+    # Without stated errors the dark readings tell their noise
+    dark = np.random.default_rng(5).normal(0.0, 0.01, 40)
+    rows = "".join(
+        f"30,{view},{value}\n" for view, value in zip(range(-60, -20), dark, strict=True)
+    )
+    scan = read_goniometer(write(tmp_path, f"{VIEW}\n{rows}30,30,1\n"))
+    assert (scan.M00 < 0).sum() == (dark < 0).sum() > 10
+    with pytest.raises(DataFileError, match=r"got -0\.1\."):
+        read_goniometer(write(tmp_path, f"{VIEW}\n{rows}30,30,1\n30,31,-0.1\n"))
 
 
 def test_small_angles_beside_large_ones_are_degrees(tmp_path):

@@ -94,6 +94,14 @@ def test_fred_angles_are_absolute_and_zero_azimuth_is_forward(tmp_path):
     assert_allclose(scan.M00, [0.5, 0.4, 0.3, 1.0])
 
 
+def test_fred_sources_at_several_azimuths_stay_apart(tmp_path):
+    text = FRED.replace("50 40", "30 90").replace("10 40 0.5", "10 90 0.5")
+    scan = read_goniometer(write(tmp_path, text))
+    assert_allclose(degrees(scan, "phi_i"), [0, 0, 0, 90])
+    assert_allclose(degrees(scan, "dphi"), [180, 270, 0, 180], atol=1e-12)
+    assert_allclose(scan.M00, [0.5, 0.4, 0.3, 1.0])
+
+
 def test_fred_in_radians(tmp_path):
     text = "type bsdf_data\nformat angles=rad bsdf=value\n0.5 0\n0.2 0 0.25\n0.3 3.14159265 1\n"
     scan = read_goniometer(write(tmp_path, text))

@@ -1,0 +1,243 @@
+"""What makes the rows of a goniometer file wrong: ranges, units, normalisation, noise."""
+
+import numpy as np
+
+from data_io.goniometer.scan import ELEMENTS, INTENSITIES, NORMALISED, STDERR, Scan
+from pbrdf.errors import DataFileError
+
+__all__ = ["check"]
+
+# Angles below this many degrees, all of them, are radians under a wrong name
+_RADIAN_LIMIT_DEG = 1.6
+# Plausible wavelengths; 532 would be nanometres [um]
+_WAVELENGTH_RANGE = (0.01, 100.0)
+# Two columns of one quantity may differ by rounding and noise
+_DOLP_TOLERANCE = 0.05
+# Part of the brightest reading below which noise may exceed the signal
+_DARK = 1e-3
+# Readings below this part of the brightest are dark, and this many tell their noise
+_DIM, _ENOUGH = 0.1, 8
+
+
+def check(scan: Scan) -> None:
+    """Raise the DataFileError of the first row that breaks a rule."""
+    _check_angles(scan)
+    _check_wavelength(scan)
+    _check_values(scan)
+    _check_dolp(scan)
+    _check_ratios(scan)
+
+
+def _check_angles(scan: Scan) -> None:
+    for column, low, high in (
+        ("theta_i", 0, 90),
+        ("theta_s", 0, 90),
+        ("dphi", -720, 720),
+        ("phi_i", -720, 720),
+        ("source_half_angle", 0, 45),
+        ("detector_half_angle", 0, 45),
+    ):
+        values = getattr(scan, column)
+        if values is None:
+            continue
+        wrong = ~((values >= low) & (values <= high))
+        if wrong.any():
+            value = values[np.argmax(wrong)]
+            problem = f"expected an angle in [{low}, {high}] deg, got {value:.9g}"
+            cure = (
+                "Zeniths are counted from the normal; below the horizon is no reflection."
+            )
+            if column.endswith("half_angle"):
+                cure = "It is half the opening of a cone of light; beyond 45 no beam is."
+            if column == "theta_i":
+                cure = "theta_i is positive; signs belong to theta_view_deg or dphi_deg."
+            raise scan.fault(wrong, column, problem, cure)
+    cure = "Write degrees: 1.5708 rad are 90 deg."
+    small = max(scan.theta_i.max(), scan.theta_s.max()) < _RADIAN_LIMIT_DEG
+    for column in ("theta_i", "theta_s"):
+        values = getattr(scan, column)
+        # One value below the limit beside larger angles may be meant so, a scan may not
+        several = np.unique(values[values > 0]).size > (0 if small else 1)
+        if several and values.max() < _RADIAN_LIMIT_DEG:
+            problem = (
+                f"expected degrees, got values up to {values.max():.6g} only, which look "
+                "like radians"
+            )
+            raise scan.fault(values == values.max(), column, problem, cure)
+    # 0.5236 is no incidence that one sets in degrees; in radians it is 30 degrees
+    turned = np.degrees(scan.theta_i)
+    round_as_radians = np.abs(turned - 5 * np.rint(turned / 5)) < 0.06
+    fine_as_degrees = np.abs(100 * scan.theta_i - np.rint(100 * scan.theta_i)) > 1e-6
+    small = (scan.theta_i > 0) & (scan.theta_i < _RADIAN_LIMIT_DEG)
+    looks_radian = small & round_as_radians & fine_as_degrees
+    if looks_radian.any():
+        row = int(np.argmax(looks_radian))
+        problem = (
+            f"expected degrees, got {scan.theta_i[row]:.6g}, which looks like "
+            f"{turned[row]:.0f} degrees in radians"
+        )
+        raise scan.fault(looks_radian, "theta_i", problem, cure)
+    # pi/2, pi and 3 pi/2 do not occur by chance in degrees
+    quarters = np.abs(scan.dphi[:, None] - np.array([0.5, 1, 1.5, 2]) * np.pi).min(axis=1)
+    looks_radian = (quarters < 2e-3) & (np.abs(scan.dphi) <= 2 * np.pi + 2e-3)
+    if looks_radian.any() and np.abs(scan.dphi).max() <= 2 * np.pi + 2e-3:
+        value = scan.dphi[np.argmax(looks_radian)]
+        problem = f"expected degrees, got {value:.6g}, which looks like radians"
+        raise scan.fault(looks_radian, "dphi", problem, cure)
+
+
+def _check_wavelength(scan: Scan) -> None:
+    if scan.wavelength is None:
+        return
+    low, high = _WAVELENGTH_RANGE
+    wrong = ~((scan.wavelength >= low) & (scan.wavelength <= high))
+    if wrong.any():
+        value = scan.wavelength[np.argmax(wrong)]
+        problem = f"expected a wavelength in [{low}, {high}] um, got {value:.9g} um"
+        cure = "Give micrometres: 532 nm are 0.532."
+        raise scan.fault(wrong, "wavelength", problem, cure)
+
+
+def _check_values(scan: Scan) -> None:
+    # Standard errors first: the limits of the values rest on them
+    for name in sorted(scan.values, key=lambda name: not name.endswith(STDERR)):
+        values = scan.values[name]
+        infinite = np.isinf(values)
+        if infinite.any():
+            raise scan.fault(infinite, name, "expected a finite number, got inf", _LEAVE)
+        if name in ("M00", "DOLP", *INTENSITIES) or name.endswith(STDERR):
+            negative = values < -_noise(scan, name)
+            if negative.any():
+                value = values[np.argmax(negative)]
+                problem = f"expected a value >= 0, got {value:.9g}"
+                raise scan.fault(negative, name, problem, _negative_cure(name))
+        if name.endswith(STDERR) and name.removesuffix(STDERR) not in scan.values:
+            problem = f"expected a column {name.removesuffix(STDERR)} beside it, found none"
+            cure = "A standard error needs its value."
+            raise DataFileError(scan.path, problem, cure, column=name)
+    if all(np.isnan(values).all() for values in scan.values.values()):
+        problem = "expected measured values, every cell is empty"
+        raise DataFileError(scan.path, problem, "Export the scan again.")
+    _check_normalisation(scan)
+
+
+_LEAVE = "Leave what was not measured empty."
+
+
+def _negative_cure(name: str) -> str:
+    """How to mend a value below zero."""
+    if name.endswith(STDERR):
+        return _LEAVE
+    if name == "DOLP":
+        return "A signed Q/I is m10 = M10/M00: name the column so."
+    return (
+        f"Readings below zero within their noise are kept: give it as {name}{STDERR}. "
+        "Leaving them out biases a fit."
+    )
+
+
+def _noise(scan: Scan, name: str) -> np.ndarray:
+    """Return how far below zero noise may take each reading: five standard errors.
+
+    Where the file states none, they are those of the dark readings, from their second
+    differences: a smooth curve has none, and noise has six times its variance.
+    """
+    values = scan.values[name]
+    if name.endswith(STDERR) or name == "DOLP":
+        return np.zeros(values.size)
+    darkest = _DARK * np.nanmax(values, initial=0.0)
+    stated = 5.0 * scan.values.get(name + STDERR, np.full(values.size, np.nan))
+    dark = values[np.isfinite(values) & (values < _DIM * np.nanmax(values, initial=0.0))]
+    if dark.size >= _ENOUGH:
+        steps = np.abs(np.diff(dark, n=2))
+        darkest = max(darkest, 5.0 * 1.4826 * float(np.median(steps)) / np.sqrt(6.0))
+    return np.where(np.isfinite(stated), stated, darkest)
+
+
+def _check_normalisation(scan: Scan) -> None:
+    """Refuse elements divided by M00, or percent: no element exceeds M00 but by noise."""
+    intensity = scan.values.get("M00")
+    if intensity is None:
+        return
+    for name in ELEMENTS[1:]:
+        if name not in scan.values:
+            continue
+        margin = 5 * np.nan_to_num(scan.values.get(name + STDERR, np.zeros(intensity.size)))
+        larger = np.abs(scan.values[name]) > intensity + margin
+        compared = np.isfinite(scan.values[name]) & np.isfinite(intensity)
+        if compared.any() and larger.sum() > 0.5 * compared.sum():
+            row = int(np.argmax(larger))
+            problem = (
+                f"expected an element in 1/sr, at most M00 = {intensity[row]:.6g}, "
+                f"got {scan.values[name][row]:.6g}"
+            )
+            cure = "Elements divided by M00 must be multiplied by it."
+            raise scan.fault(larger, name, problem, cure)
+        impossible = _beyond(scan, name, intensity)
+        if impossible.any():
+            row = int(np.argmax(impossible))
+            problem = (
+                f"expected at most M00 = {intensity[row]:.6g} in size, got "
+                f"{scan.values[name][row]:.6g}, which no surface reflects"
+            )
+            raise scan.fault(impossible, name, problem, f"Mend the row. {_LEAVE}")
+
+
+def _check_ratios(scan: Scan) -> None:
+    """Refuse a ratio to M00 that no surface reflects, or per cent."""
+    for name in NORMALISED:
+        if name not in scan.values:
+            continue
+        values = scan.values[name]
+        error = np.nan_to_num(scan.values.get(name + STDERR, np.zeros(values.size)))
+        wrong = np.abs(values) > np.where(error > 0, 1.02 + 5.0 * error, 2.0)
+        if wrong.any():
+            problem = (
+                f"expected an element divided by M00, in [-1, 1], got "
+                f"{values[np.argmax(wrong)]:.6g}"
+            )
+            cure = f"In 1/sr its name is {name.upper()}; divide per cent by 100."
+            raise scan.fault(wrong, name, problem, cure)
+
+
+def _beyond(scan: Scan, name: str, intensity: np.ndarray) -> np.ndarray:
+    """Tell where an element exceeds M00 by more than its error can explain.
+
+    Where the file states no errors, a factor of two above what a detector still sees.
+    """
+    size = np.abs(scan.values[name])
+    nothing = np.zeros(size.size)
+    error = np.hypot(
+        np.nan_to_num(scan.values.get(name + STDERR, nothing)),
+        np.nan_to_num(scan.values.get("M00" + STDERR, nothing)),
+    )
+    floor = _DARK * np.nanmax(intensity, initial=0.0)
+    stated = size > 1.02 * intensity + 5.0 * error
+    unstated = size > 2.0 * intensity + floor
+    return np.asarray(np.where(error > 0.0, stated, unstated))
+
+
+def _check_dolp(scan: Scan) -> None:
+    """DOLP is a fraction, and sqrt(M10^2 + M20^2) / M00 where these are given too."""
+    dolp = scan.values.get("DOLP")
+    if dolp is None:
+        return
+    noise = 5 * np.nan_to_num(scan.values.get("DOLP" + STDERR, np.zeros(dolp.size)))
+    wrong = dolp > 1 + noise
+    if wrong.any():
+        problem = f"expected a fraction in [0, 1], got {dolp[np.argmax(wrong)]:.9g}"
+        raise scan.fault(wrong, "DOLP", problem, "Divide per cent by 100.")
+    if not {"M00", "M10", "M20"} <= scan.values.keys():
+        return
+    m00, m10, m20 = (scan.values[name] for name in ("M00", "M10", "M20"))
+    lit = m00 > 0
+    ratio = np.hypot(m10, m20)[lit] / m00[lit]
+    for name in ("M10", "M20"):
+        error = scan.values.get(name + STDERR, np.zeros(dolp.size))
+        noise[lit] += 5 * np.nan_to_num(error[lit]) / m00[lit]
+    wrong[lit] = np.abs(ratio - dolp[lit]) > _DOLP_TOLERANCE + noise[lit]
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        expected = np.hypot(m10[row], m20[row]) / m00[row]
+        problem = f"expected sqrt(M10^2 + M20^2)/M00 = {expected:.4g}, got {dolp[row]:.4g}"
+        raise scan.fault(wrong, "DOLP", problem, "Mend or drop one of the columns.")

@@ -1,0 +1,93 @@
+"""The checked rows of a goniometer file as a dataset."""
+
+from hashlib import sha256
+
+import numpy as np
+import xarray as xr
+
+from data_io.goniometer.checks import check
+from data_io.goniometer.scan import CONVENTIONS, RATIOS, STDERR, Scan
+
+__all__ = ["to_dataset"]
+
+_SAME_DEG = 1e-6
+_OPTIONAL = {
+    "phi_i": "azimuth of the source",
+    "source_half_angle": "half-angle of the source",
+    "detector_half_angle": "half-angle of the detector",
+}
+
+
+def to_dataset(scan: Scan) -> xr.Dataset:
+    """Check a scan and return it as a dataset with the one dimension `geometry`.
+
+    Raises
+    ------
+    DataFileError
+        For the first row that breaks a rule: angles in range and in degrees, M00 >= 0,
+        elements in 1/sr or divided by M00, 0 <= DOLP <= 1 and in agreement with M10, M20,
+        standard errors >= 0, a plausible wavelength, and one value for one geometry.
+    """
+    check(scan)
+    keep = _distinct(scan)
+    coords = {
+        "theta_i": ("geometry", np.radians(scan.theta_i[keep]), _angle("incident zenith")),
+        "theta_s": ("geometry", np.radians(scan.theta_s[keep]), _angle("scattered zenith")),
+        "dphi": ("geometry", wrap(scan.dphi[keep]), _angle("azimuth difference")),
+    }
+    if scan.wavelength is not None:
+        units = {"units": "um", "long_name": "vacuum wavelength"}
+        coords["wavelength"] = ("geometry", scan.wavelength[keep], units)
+    for name, long_name in _OPTIONAL.items():
+        angle = getattr(scan, name)
+        if angle is not None:
+            coords[name] = ("geometry", np.radians(angle[keep]), _angle(long_name))
+    data = {
+        name: ("geometry", values[keep], {"units": _units(name, scan.quantity)})
+        for name, values in scan.values.items()
+    }
+    attrs: dict[str, object] = {
+        "source": scan.path.name,
+        "sha256": sha256(scan.path.read_bytes()).hexdigest(),
+        "conventions": CONVENTIONS,
+        "quantity": scan.quantity,
+    }
+    return xr.Dataset(data, coords, attrs | dict(scan.attrs))
+
+
+def wrap(dphi_deg: np.ndarray) -> np.ndarray:
+    """Return azimuth differences in [0, 2 pi). [rad]"""
+    return np.radians(np.mod(dphi_deg, 360.0))
+
+
+def _angle(long_name: str) -> dict[str, str]:
+    return {"units": "rad", "long_name": long_name}
+
+
+def _units(name: str, quantity: str) -> str:
+    ratio = name.removesuffix(STDERR) in RATIOS
+    return "1" if ratio or quantity == "relative" else "sr-1"
+
+
+def _distinct(scan: Scan) -> np.ndarray:
+    """Return the rows to keep: the first of each geometry, if repeats say the same."""
+    azimuths = [scan.dphi] + ([] if scan.phi_i is None else [scan.phi_i])
+    others = [scan.theta_i, scan.theta_s]
+    others += [] if scan.wavelength is None else [scan.wavelength]
+    turns = np.rint(np.column_stack(azimuths) / _SAME_DEG).astype(np.int64)
+    turns %= round(360.0 / _SAME_DEG)
+    keys = np.column_stack([np.rint(np.column_stack(others) / _SAME_DEG), turns])
+    _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    original = first[inverse.ravel()]
+    for name, values in scan.values.items():
+        reference = values[original]
+        differs = (values != reference) & ~(np.isnan(values) & np.isnan(reference))
+        if differs.any():
+            row = int(np.argmax(differs))
+            problem = (
+                f"expected one value a geometry, got {values[row]:.6g}, "
+                f"line {scan.lines[original[row]]} has {reference[row]:.6g}"
+            )
+            cure = "Average repeats into one row with its standard error."
+            raise scan.fault(differs, name, problem, cure)
+    return np.sort(first)
