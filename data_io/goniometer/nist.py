@@ -94,7 +94,8 @@ def _to_conventions(
     mueller = elements.reshape(-1, 4, 4) * elements[:, :1, None]
     mueller[:, 0, 0] = elements[:, 0]
     into_meridian = rotation(np.cos(phi_s), np.sin(phi_s))
-    from_meridian = rotation(np.cos(phi_i), -np.sin(phi_i))
+    # The beam comes down: its frame turns against its azimuth, seen along the beam
+    from_meridian = rotation(np.cos(phi_i), np.sin(phi_i))
     mueller = into_meridian @ mueller @ from_meridian
     left_to_right = np.array([1.0, 1.0, 1.0, -1.0])
     return mueller * np.outer(left_to_right, left_to_right)

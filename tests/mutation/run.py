@@ -1,0 +1,150 @@
+"""Change one sign or factor of the physics at a time and see whether a test notices.
+
+    python tests/mutation/run.py --named
+    python tests/mutation/run.py MODULE.py TEST.py [TEST.py ...]
+
+The first form makes the mutants that once survived; the second every mutant of a module
+(each + and -, * and /, sign, comparison and number of its arithmetic), and runs the tests
+that follow. Each runs in a copy of the sources with the compiler of kernels off, and
+stops at its first failure. Survivors are listed; exit code 1 if there are any. Not part of the
+suite: a module takes from minutes to an hour.
+"""
+
+import argparse
+import ast
+import copy
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+SWAPS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
+TURNS = {ast.Lt: ast.Gt, ast.Gt: ast.Lt, ast.LtE: ast.GtE, ast.GtE: ast.LtE}
+PINS = "tests/analytic/test_pinned_signs_and_factors.py"
+SHADOWING = "pbrdf/kernels/microfacet/shadowing.py"
+SLOPES = "pbrdf/kernels/microfacet/slopes.py"
+SCATTER = "fitting/statistics/axis/scatter.py"
+# module, text, what it becomes, name of the test that must fail
+NAMED = (
+    (SHADOWING, "4.41 * azimuth + 1.0", "4.41 * azimuth + 2.0", "hiding"),
+    (SHADOWING, "return 4.41", "return 4.0", "hiding"),
+    (SLOPES, "0.2 + gap", "0.3 + gap", "cauchy"),
+    (SLOPES, "series = 1.0 / 3.0 + gap", "series = 1.0 / 3.0 - gap", "cauchy"),
+    (SCATTER, "= rise**2 @ weight", "= 0.5 * rise**2 @ weight", "isserlis"),
+    (SCATTER, "drop + 2 * noise**2", "drop + noise**2", "isserlis"),
+    ("fitting/objective/uncertainty.py", "* m / max(m - n, 1)", "", "robust"),
+    ("fitting/result/likelihood.py", "widened = (", "widened = 1.0 + 0.0 * (", "student"),
+    ("data_io/goniometer/nist.py", "(np.cos(phi_i), np", "(np.cos(phi_i), -np", "nist"),
+)
+
+
+def changed(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield what one node may become."""
+    new = copy.deepcopy(node)
+    if isinstance(node, ast.BinOp) and type(node.op) in SWAPS:
+        new.op = SWAPS[type(node.op)]()
+        yield new
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        yield new.operand
+    elif isinstance(node, ast.Compare) and type(node.ops[0]) in TURNS:
+        new.ops[0] = TURNS[type(node.ops[0])]()
+        yield new
+    elif isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        new.value = node.value * 1.1 if isinstance(node.value, float) else node.value + 1
+        if node.value == 0:
+            new.value = type(node.value)(1)
+        yield new
+
+
+def mutants(source: str) -> Iterator[tuple[int, str, str]]:
+    """Yield line, description and text of each mutant of a module's functions."""
+    lines = source.splitlines(keepends=True)
+    inside = [f for f in ast.parse(source).body if isinstance(f, ast.FunctionDef)]
+    for node in (child for f in inside for part in f.body for child in ast.walk(part)):
+        if not isinstance(node, ast.expr) or node.lineno != node.end_lineno:
+            continue
+        for new in changed(node):
+            line = lines[node.lineno - 1]
+            # Columns of the parser count bytes
+            raw = line.encode()
+            old = raw[node.col_offset : node.end_col_offset].decode()
+            text = f"({ast.unparse(new)})"
+            edited = raw[: node.col_offset] + text.encode() + raw[node.end_col_offset :]
+            whole = [*lines[: node.lineno - 1], edited.decode(), *lines[node.lineno :]]
+            yield node.lineno, f"{old} -> {text[1:-1]}", "".join(whole)
+
+
+def survives(
+    folder: Path, module: str, text: str, tests: list[str], seconds: float
+) -> bool:
+    """Whether the tests pass with this text for the module."""
+    target = folder / module
+    original = target.read_text()
+    target.write_text(text)
+    environment = os.environ | {
+        "PYTHONPATH": str(folder),
+        "NUMBA_DISABLE_JIT": "1",
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
+    try:
+        run = subprocess.run(
+            command, cwd=folder, env=environment, capture_output=True, timeout=seconds,
+            check=False,
+        )  # fmt: skip
+        return run.returncode == 0
+    except subprocess.TimeoutExpired:
+        # An endless loop is noticed
+        return False
+    finally:
+        target.write_text(original)
+
+
+def main() -> int:
+    """Run the mutants that the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("module", nargs="?")
+    parser.add_argument("tests", nargs="*")
+    parser.add_argument("--named", action="store_true")
+    parser.add_argument("--every", type=int, default=1, help="only every N-th mutant")
+    parser.add_argument("--seconds", type=float, default=300.0, help="limit of one run")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for part in ("pbrdf", "fitting", "data_io", "tests"):
+            shutil.copytree(ROOT / part, folder / part)
+        shutil.copy(ROOT / "pyproject.toml", folder)
+        if given.named:
+            todo = [
+                (
+                    module,
+                    f"{old} -> {new}",
+                    (ROOT / module).read_text().replace(old, new),
+                    [test],
+                )
+                for module, old, new, test in NAMED
+            ]
+        else:
+            listed = list(mutants((ROOT / given.module).read_text()))[:: given.every]
+            todo = [
+                (given.module, f"line {line}: {what}", text, given.tests)
+                for line, what, text in listed
+            ]
+        kept = 0
+        for module, what, text, tests in todo:
+            if text == (ROOT / module).read_text():
+                print(f"NOT FOUND {module} {what}", flush=True)
+                kept += 1
+            elif survives(folder, module, text, tests, given.seconds):
+                print(f"SURVIVED {module} {what}", flush=True)
+                kept += 1
+        print(f"{kept} of {len(todo)} mutants survived")
+    return int(kept > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
