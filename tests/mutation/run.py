@@ -6,8 +6,8 @@
 The first form makes the mutants that once survived; the second every mutant of a module
 (each + and -, * and /, sign, comparison and number of its arithmetic), and runs the tests
 that follow. Each runs in a copy of the sources with the compiler of kernels off, and
-stops at its first failure. Survivors are listed; exit code 1 if there are any. Not part of the
-suite: a module takes from minutes to an hour.
+stops at its first failure. Survivors are listed; exit code 1 if there are any. Not part
+of the suite: a module takes from minutes to an hour.
 """
 
 import argparse
