@@ -12,7 +12,7 @@ from pbrdf.optics.mueller import (
     dolp,
     is_physical,
 )
-from pbrdf.optics.read_table import material_from_csv
+from pbrdf.optics.published import read as read_material
 
 __all__ = [
     "CONVENTIONS",
@@ -30,7 +30,7 @@ __all__ = [
     "dolp",
     "fresnel_amplitudes",
     "is_physical",
-    "material_from_csv",
+    "read_material",
     "specular_mueller",
     "transmission_mueller",
 ]

@@ -10,7 +10,7 @@ from importlib.resources import files
 
 from pbrdf.optics.dispersion import Sellmeier
 from pbrdf.optics.materials import Material
-from pbrdf.optics.read_table import material_from_csv
+from pbrdf.optics.published import read
 
 __all__ = ["get", "names"]
 
@@ -48,7 +48,7 @@ def _library() -> dict[str, Material]:
     """Every material by name."""
     folder = files("pbrdf.optics") / "tables"
     tables = [entry for entry in folder.iterdir() if entry.name.endswith(".csv")]
-    entries = _formulas() + [material_from_csv(entry) for entry in tables]
+    entries = _formulas() + [read(entry) for entry in tables]
     return {str(entry.name): entry for entry in entries}
 
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from pbrdf import materials
 from pbrdf.errors import DataFileError
-from pbrdf.optics import Material, Polynomial, Sellmeier, material_from_csv
+from pbrdf.optics import Material, Polynomial, Sellmeier, read_material
 
 
 @pytest.mark.parametrize(
@@ -92,14 +92,14 @@ def test_bad_tables_name_line_and_column(tmp_path, text, message):
     path = tmp_path / "paint.csv"
     path.write_text(text)
     with pytest.raises(DataFileError, match=message):
-        material_from_csv(path)
+        read_material(path)
 
 
 def test_unreadable_table_is_refused(tmp_path):
     path = tmp_path / "paint.csv"
     path.write_bytes(b"\xff\xfe\x00\x80")
     with pytest.raises(DataFileError, match="cannot be read as text"):
-        material_from_csv(path)
+        read_material(path)
 
 
 def test_material_refuses_what_it_cannot_mean():

@@ -1,0 +1,166 @@
+"""A Material from a file of optical constants, whatever published it."""
+
+import re
+import warnings
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+import numpy as np
+
+from pbrdf.errors import AccuracyWarning, DataFileError
+from pbrdf.optics.dispersion import Table
+from pbrdf.optics.materials import Material
+from pbrdf.optics.published.database import read_database_entry
+from pbrdf.optics.published.tables import Block, read_blocks
+from pbrdf.optics.published.text import read_text
+
+__all__ = ["read"]
+
+_SOURCE = re.compile(r"^[#%;!/\s]*source:\s*(.+)$", re.MULTILINE)
+# Beyond the far infrared: more likely nanometres under the name of micrometres [um]
+_LONG = 100.0
+# Below it every index is close to 1, as no reading in the visible is. [um], [1]
+_X_RAYS, _NEAR_ONE = 0.01, 0.3
+
+
+def read(path: str | Path | Traversable) -> Material:
+    r"""Material from a file of optical constants; the file's name is its name.
+
+    Parameters
+    ----------
+    path : str or Path
+        One of:
+
+        - a table with names of columns, separated by commas, semicolons, tabs or spaces:
+          wavelength_nm, wavelength_um, energy_ev, wavenumber_cm-1 (or the unit in brackets
+          or in a row below); n; kappa, k or extinction; or eps1, eps2. n and k may stand
+          in one table each, as in the export of refractiveindex.info;
+        - a YAML file of the refractiveindex.info database, tables and formulas 1 to 9;
+        - an .nk file whose comments name the unit;
+        - the text format of ellipsometry programs: a comment, a unit, ``NK``, rows.
+
+        Lines that start with # are comments; one that starts "# source:" is kept.
+
+    Returns
+    -------
+    Material
+        Interpolated linearly in the wavelength, never extrapolated.
+
+    Raises
+    ------
+    DataFileError
+        Naming all unknown columns at once, a missing or implausible unit, or the line and
+        column of the first value that is no number, negative or given twice.
+
+    Warns
+    -----
+    AccuracyWarning
+        If wavelengths beyond 100 um may be nanometres.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> path = Path(tempfile.mkdtemp()) / "paint.csv"
+    >>> _ = path.write_text("wavelength_nm,n,k\n400,1.6,0.1\n800,1.5,0.2\n")
+    >>> read(path).index(0.6)
+    (1.55, 0.15)
+    """
+    file = Path(path) if isinstance(path, str) else path
+    shown = file if isinstance(file, Path) else Path(file.name)
+    text = read_text(file, shown)
+    if shown.suffix.lower() in (".yml", ".yaml"):
+        n, kappa, source = read_database_entry(shown, text)
+        return Material(n, kappa, name=shown.stem, source=source)
+    constants: dict[str, Table] = {}
+    for block in read_blocks(shown, text):
+        for name, table in _constants(shown, block).items():
+            if name in constants:
+                problem = f"expected one table of {name}, got two"
+                raise DataFileError(shown, problem, "Keep one.", line=block.lines[0])
+            constants[name] = table
+    if "n" not in constants:
+        problem = "expected a column n, got none"
+        raise DataFileError(shown, problem, "Give n beside kappa.")
+    found = _SOURCE.search(text)
+    return Material(
+        constants["n"],
+        constants.get("kappa", 0.0),
+        name=shown.stem,
+        source=found[1].strip() if found else None,
+    )
+
+
+def _constants(path: Path, block: Block) -> dict[str, Table]:
+    """Return n and kappa of a block against rising wavelengths."""
+    spectral = block.column("wavelength")
+    waves = spectral.to_um(block.values("wavelength") or [])
+    _check_plausible(path, block, waves)
+    order = np.argsort(waves, kind="stable")
+    waves = waves[order]
+    twice = np.flatnonzero(np.diff(waves) <= 0)
+    if twice.size:
+        row = int(order[twice[0] + 1])
+        value = block.values("wavelength")[row]  # type: ignore[index]
+        problem = f"expected rising or falling wavelengths, got {value:g} twice"
+        cure = "Drop the repeated row."
+        raise DataFileError(
+            path, problem, cure, line=block.lines[row], column=spectral.name
+        )
+    columns = {
+        role: np.asarray(values)[order]
+        for role in ("n", "kappa", "eps1", "eps2")
+        if (values := block.values(role)) is not None
+    }
+    if "eps1" in columns:
+        if "n" in columns or "kappa" in columns:
+            problem = "expected n and kappa or eps1 and eps2, got both"
+            raise DataFileError(path, problem, "Keep one pair.")
+        # (n + i kappa)^2 = eps1 + i eps2; the principal root absorbs
+        index = np.sqrt(columns.pop("eps1") + 1j * columns.pop("eps2", 0.0))
+        columns = {"n": index.real, "kappa": index.imag}
+    elif "eps2" in columns:
+        problem = "expected eps1 beside eps2, got none"
+        raise DataFileError(path, problem, "Give both.")
+    for k, value in enumerate(columns.get("n", ())):
+        if value <= 0:
+            problem = f"expected n > 0, got {value:g}"
+            raise DataFileError(
+                path, problem, "Mend the row.", line=block.lines[int(order[k])], column="n"
+            )
+    try:
+        return {role: Table.of(role, waves, values) for role, values in columns.items()}
+    except ValueError as error:
+        raise DataFileError(path, str(error).rstrip("."), "Mend the table.") from error
+
+
+def _check_plausible(path: Path, block: Block, waves: np.ndarray) -> None:
+    """Refuse units that the numbers contradict; warn of those that they make unlikely."""
+    spectral = block.column("wavelength")
+    wrong = ~(np.isfinite(waves) & (waves > 0))
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        given = (block.values("wavelength") or [])[row]
+        problem = f"expected a wavelength > 0, got {given:g}"
+        raise DataFileError(
+            path, problem, "Mend the row.", line=block.lines[row], column=spectral.name
+        )
+    index = np.asarray(block.values("n") or np.ones(len(waves)))
+    rays = (waves < _X_RAYS) & (np.abs(index - 1.0) > _NEAR_ONE)
+    if rays.any():
+        row = int(np.argmax(rays))
+        given = (block.values("wavelength") or [])[row]
+        problem = (
+            f"expected an index near 1 at {given:g} {spectral.unit} "
+            f"({1e3 * waves[row]:.3g} nm, X-rays), got {index[row]:g}"
+        )
+        cure = f"The unit is not {spectral.unit}: name the right one, for example nm."
+        raise DataFileError(
+            path, problem, cure, line=block.lines[row], column=spectral.name
+        )
+    if waves.min() >= _LONG and spectral.unit == "um":
+        low, high = waves.min(), waves.max()
+        msg = (
+            f"{path.name}: wavelengths of {low:g} to {high:g} um lie beyond the infrared; "
+            f"they may be nanometres. Then head the column wavelength_nm."
+        )
+        warnings.warn(msg, AccuracyWarning, stacklevel=4)
