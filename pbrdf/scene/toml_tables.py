@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,19 @@ from pbrdf.errors import DataFileError
 from pbrdf.optics import library
 from pbrdf.optics.dispersion import Table
 from pbrdf.optics.materials import Material
+from pbrdf.optics.published import read
+from pbrdf.optics.published.formulas import Formula
+from pbrdf.optics.published.package import PREFIX, Entry
 
-MATERIAL_KEYS = {"material", "n", "kappa", "diffuse_albedo", "wavelength_um", "name"}
+MATERIAL_KEYS = {
+    "material",
+    "n",
+    "kappa",
+    "diffuse_albedo",
+    "wavelength_um",
+    "name",
+    "file",
+}
 
 
 def read_toml(source: Path) -> dict[str, Any]:
@@ -76,16 +88,54 @@ def material_table(material: Material) -> dict[str, Any]:
     if material.name in library.names() and library.get(str(material.name)) == material:
         return {"material": material.name}
     table: dict[str, Any] = {} if material.name is None else {"name": material.name}
-    for key, constant in (("n", material.n), ("kappa", material.kappa)):
-        if isinstance(constant, Table):
-            table["wavelength_um"] = list(constant.wavelength)
-            table[key] = list(constant.values)
-        elif callable(constant):
-            msg = f"{key} must be a number or a table to be written, got {constant!r}."
-            raise ValueError(msg)
-        else:
-            table[key] = constant
-    return table | {"diffuse_albedo": material.diffuse_albedo}
+    table["diffuse_albedo"] = material.diffuse_albedo
+    n, kappa = material.n, material.kappa
+    if isinstance(n, Entry):
+        return table | {"file": f"{PREFIX}{n.address}"}
+    grids = {c.wavelength for c in (n, kappa) if isinstance(c, Table)}
+    if len(grids) == 1 and not isinstance(n, Formula):
+        table["wavelength_um"] = list(grids.pop())
+        return table | {"n": _plain_constant(n), "kappa": _plain_constant(kappa)}
+    return table | {"n": _constant_table("n", n), "kappa": _constant_table("kappa", kappa)}
+
+
+def _plain_constant(constant: Any) -> Any:
+    """Write a number, or the values of a table whose wavelengths stand beside it."""
+    return list(constant.values) if isinstance(constant, Table) else constant
+
+
+def _constant_table(key: str, constant: Any) -> Any:
+    """Write a constant that has wavelengths of its own, or follows a formula."""
+    if isinstance(constant, Table):
+        return {"wavelength_um": list(constant.wavelength), "values": list(constant.values)}
+    if isinstance(constant, Formula):
+        return {
+            "formula": constant.number,
+            "coefficients": list(constant.coefficients),
+            "range_um": list(constant.valid_range),
+        }
+    if callable(constant):
+        msg = (
+            f"{key} must be a number, a table or a Formula to be written, got "
+            f"{constant!r}. Tabulate it with Material.from_table."
+        )
+        raise ValueError(msg)
+    return constant
+
+
+def _read_constant(key: str, value: Any) -> Any:
+    """Read a constant: a number, a list, a table of its own or a formula."""
+    if not isinstance(value, dict):
+        return value
+    if value.keys() == {"wavelength_um", "values"}:
+        return Table.of(key, value["wavelength_um"], value["values"])
+    if key == "n" and value.keys() == {"formula", "coefficients", "range_um"}:
+        low, high = value["range_um"]
+        return Formula(value["formula"], tuple(value["coefficients"]), (low, high))
+    known = "wavelength_um and values"
+    known += ", or formula, coefficients and range_um" if key == "n" else ""
+    msg = f"{key} must have the keys {known}, got {', '.join(map(repr, value))}."
+    raise ValueError(msg)
 
 
 def read_material(table: Mapping[str, Any], place: str, source: Path) -> Material:
@@ -99,9 +149,30 @@ def read_material(table: Mapping[str, Any], place: str, source: Path) -> Materia
                 "Name a library material, or give n and kappa.",
             )  # fmt: skip
         return library.get(table["material"])
+    if "file" in table:
+        return _material_of_file(table, place, source)
     if "n" not in table:
         raise DataFileError(source, f"[{place}]: key 'n' is missing", "Or give 'material'.")
     wavelength = table.pop("wavelength_um", None)
+    for key in ("n", "kappa"):
+        if key in table:
+            table[key] = _read_constant(key, table[key])
     if wavelength is None:
         return Material(**table)
     return Material.from_table(wavelength=wavelength, **table)
+
+
+def _material_of_file(table: Mapping[str, Any], place: str, source: Path) -> Material:
+    """Read a material from a file of optical constants, named from the scene's folder."""
+    beside = set(table) - {"file", "diffuse_albedo", "name"}
+    if beside:
+        problem = f"[{place}]: 'file' stands beside {', '.join(sorted(beside))}"
+        cure = "The file has the constants; only diffuse_albedo and name may be added."
+        raise DataFileError(source, problem, cure)
+    name = table["file"]
+    if not isinstance(name, str):
+        problem = f"[{place}]: 'file' must be a path, got {name!r}"
+        raise DataFileError(source, problem, "Write file = 'constants.csv'.")
+    material = read(name if name.startswith(PREFIX) else source.parent / name)
+    given = {key: table[key] for key in ("diffuse_albedo", "name") if key in table}
+    return replace(material, **given)

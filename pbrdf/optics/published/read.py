@@ -11,6 +11,7 @@ from pbrdf.errors import AccuracyWarning, DataFileError
 from pbrdf.optics.dispersion import Table
 from pbrdf.optics.materials import Material
 from pbrdf.optics.published.database import read_database_entry
+from pbrdf.optics.published.package import PREFIX, read_by_name
 from pbrdf.optics.published.tables import Block, read_blocks
 from pbrdf.optics.published.text import read_text
 
@@ -37,7 +38,9 @@ def read(path: str | Path | Traversable) -> Material:
           in one table each, as in the export of refractiveindex.info;
         - a YAML file of the refractiveindex.info database, tables and formulas 1 to 9;
         - an .nk file whose comments name the unit;
-        - the text format of ellipsometry programs: a comment, a unit, ``NK``, rows.
+        - the text format of ellipsometry programs: a comment, a unit, ``NK``, rows;
+        - ``refractiveindex:main/Al/Rakic``, an entry of that database by shelf, book and
+          page, if the package refractiveindex is installed.
 
         Lines that start with # are comments; one that starts "# source:" is kept.
 
@@ -65,12 +68,16 @@ def read(path: str | Path | Traversable) -> Material:
     >>> read(path).index(0.6)
     (1.55, 0.15)
     """
+    if str(path).startswith(PREFIX):
+        name = str(path).removeprefix(PREFIX)
+        index, extinction, source = read_by_name(name)
+        return Material(index, extinction, name=name, source=source)
     file = Path(path) if isinstance(path, str) else path
     shown = file if isinstance(file, Path) else Path(file.name)
     text = read_text(file, shown)
     if shown.suffix.lower() in (".yml", ".yaml"):
-        n, kappa, source = read_database_entry(shown, text)
-        return Material(n, kappa, name=shown.stem, source=source)
+        n, kappa, reference = read_database_entry(shown, text)
+        return Material(n, kappa, name=shown.stem, source=reference)
     constants: dict[str, Table] = {}
     for block in read_blocks(shown, text):
         for name, table in _constants(shown, block).items():
