@@ -39,9 +39,10 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     ----------
     measurement : Dataset, or sequence or mapping of them
         Goniometer scans as `data_io.read_goniometer` returns them: dimension `geometry`;
-        any of M00..M33, DOLP, and s/p intensities I_s, I_p, f_ss, f_sp, f_ps, f_pp;
-        `<name>_stderr` weighs where present. DOLP is left out where M00 and M10 are there,
-        from which it was computed.
+        any of M00..M33, elements divided by M00 (m10..m33), DOLP, and s/p intensities I_s,
+        I_p, f_ss, f_sp, f_ps, f_pp; `<name>_stderr` weighs where present. DOLP is left out
+        where M00 and M10 are there, from which it was computed. The attribute `quantity` is
+        "brdf", or "relative": then every scan gets a free `scale`.
     model : MicrofacetModel or MuellerModel
         Start values, and the values of all that is not free. A simulated surface goes in
         the same way: `fitting.SimulatedModel`.
@@ -57,8 +58,10 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
         What is known from elsewhere. For a free parameter it is one more reading of it. For
         one that is not free, as a slope_rms measured on a height map, the parameter takes
         that value and its uncertainty goes into the standard errors of the free ones.
-    separate : sequence of str, or mapping of str to {"scan", "wavelength", "theta_i"}
+    separate : sequence of str, or mapping to {"scan", "wavelength", "theta_i", "nothing"}
         Free parameters that have a value of their own in each scan, or each such group.
+        Where the scans hold several wavelengths, gains, albedos and the index have one for
+        each by default, named `diffuse_albedo[0.45]`; slopes are shared.
     use : sequence of str, optional
         Observables to use; default all.
     mask : callable or iterable of callables

@@ -9,7 +9,7 @@ import numpy as np
 from fitting.objective.objective import Prediction
 from fitting.readings.aperture import Aperture, rays_through
 from fitting.readings.mixing import Mixing
-from fitting.readings.observations import LINEAR, Geometry, Observations
+from fitting.readings.observations import LINEAR, NORMALISED, Geometry, Observations
 
 if TYPE_CHECKING:
     import casadi
@@ -18,6 +18,20 @@ __all__ = ["Layout", "MuellerModel", "predict"]
 
 # Parameters of the instrument, which every model has, and their values in a fixed state
 INSTRUMENT = {"scale": 1.0, "background": 0.0}
+# What may differ from wavelength to wavelength; slopes and shadowing are geometry
+SPECTRAL = (
+    "specular_gain",
+    "diffuse_albedo",
+    "volume_albedo",
+    "volume_depolarization",
+    "grazing_albedo",
+    "n",
+    "kappa",
+    "scale",
+    "background",
+)
+# By what parameters can be told apart
+GROUPS = ("scan", "wavelength", "theta_i", "nothing")
 
 
 class MuellerModel(Protocol):
@@ -57,7 +71,7 @@ class Layout:
     base : tuple of str
         Parameter of each entry.
     column : mapping of str to ndarray of int, shape (N,)
-        For each free parameter the entry that holds at each geometry.
+        For each free parameter the entry that holds at each geometry, -1 where it is held.
     """
 
     labels: tuple[str, ...]
@@ -70,6 +84,8 @@ class Layout:
         free: Sequence[str],
         observations: Observations,
         separate: Sequence[str] | Mapping[str, str] = (),
+        *,
+        all_scans: bool = True,
     ) -> "Layout":
         """Lay out the free parameters, one entry each or one for each group.
 
@@ -79,46 +95,83 @@ class Layout:
             Parameters to vary.
         observations : Observations
             The data.
-        separate : sequence of str, or mapping of str to {"scan", "wavelength", "theta_i"}
-            Parameters with a value of their own in each scan, or in each such group.
+        separate : sequence of str, or mapping of str to a word of `GROUPS`
+            Parameters with a value of their own in each scan, or in each such group. By
+            default those of `SPECTRAL` have one for each wavelength, and the scale of
+            relative data one for each scan.
+        all_scans : bool
+            False if only relative scans have a free scale.
         """
-        groups = (
-            separate if isinstance(separate, Mapping) else dict.fromkeys(separate, "scan")
-        )
-        strangers = set(groups) - set(free)
-        if strangers:
-            msg = f"separate must name free parameters, got {sorted(strangers)[0]!r}."
-            raise ValueError(msg)
+        rules = _rules(free, observations, separate)
+        read = np.isin(np.arange(observations.geometry.size), observations.at)
         labels: list[str] = []
         base: list[str] = []
         column = {}
         for name in free:
-            if name in groups:
-                texts, member = _groups(groups[name], observations)
-                column[name] = member + len(labels)
-                labels += [f"{name}[{text}]" for text in texts]
-                base += [name] * len(texts)
-            else:
-                column[name] = np.full(observations.geometry.size, len(labels))
-                labels.append(name)
-                base.append(name)
+            here = np.ones_like(read)
+            if name == "scale" and not all_scans:
+                here = observations.relative[observations.scan]
+            texts, member = _groups(rules[name], observations, read & here)
+            column[name] = np.where(here, member + len(labels), -1)
+            labels += [f"{name}[{text}]" if text else name for text in texts]
+            base += [name] * len(texts)
         return cls(tuple(labels), tuple(base), column)
 
 
-def _groups(by: str, observations: Observations) -> tuple[list[str], np.ndarray]:
-    """Return the group names and the group of each geometry."""
-    if by == "scan":
-        return list(observations.labels), observations.scan
-    if by == "wavelength":
-        keys = observations.geometry.wavelength
-        texts = [f"{key:g} um" for key in np.unique(keys)]
-    elif by == "theta_i":
-        keys = observations.geometry.theta_i.round(9)
-        texts = [f"{np.rad2deg(key):.4g} deg" for key in np.unique(keys)]
-    else:
-        msg = f"separate must be by scan, wavelength or theta_i, got {by!r}."
+def _rules(
+    free: Sequence[str],
+    observations: Observations,
+    separate: Sequence[str] | Mapping[str, str],
+) -> dict[str, tuple[str, ...]]:
+    """Return by what each free parameter is told apart."""
+    asked = separate if isinstance(separate, Mapping) else dict.fromkeys(separate, "scan")
+    strangers = set(asked) - set(free)
+    if strangers:
+        msg = f"separate must name free parameters, got {sorted(strangers)[0]!r}."
         raise ValueError(msg)
-    return texts, np.unique(keys, return_inverse=True)[1]
+    for word in asked.values():
+        if word not in GROUPS:
+            msg = f"separate must be by {', '.join(GROUPS)}, got {word!r}."
+            raise ValueError(msg)
+    several = len(observations.wavelengths) > 1
+    rules = {}
+    for name in free:
+        by = asked.get(name)
+        if by is None and name == "scale" and observations.relative.any():
+            by = "scan" if len(observations.labels) > 1 else None
+        if by is None:
+            by = "wavelength" if several and name in SPECTRAL else "nothing"
+        rule: tuple[str, ...] = () if by == "nothing" else (by,)
+        # A group that holds several wavelengths still has a value for each
+        crowded = observations.mixes_wavelengths if by == "scan" else several
+        if by in ("scan", "theta_i") and name in SPECTRAL and crowded:
+            rule += ("wavelength",)
+        rules[name] = rule
+    return rules
+
+
+def _groups(
+    rule: tuple[str, ...], observations: Observations, within: np.ndarray
+) -> tuple[list[str], np.ndarray]:
+    """Return the groups that occur `within` by name, and the group of each geometry."""
+    geometry = observations.geometry
+    member = np.zeros(geometry.size, dtype=int)
+    texts = [""]
+    for word in rule:
+        if word == "scan":
+            keys, words = observations.scan, list(observations.labels)
+        elif word == "wavelength":
+            waves = np.unique(geometry.wavelength.round(9))
+            keys = np.searchsorted(waves, geometry.wavelength.round(9))
+            words = [f"{wave:.9g}" if np.isfinite(wave) else "?" for wave in waves]
+        else:
+            angles, keys = np.unique(geometry.theta_i.round(9), return_inverse=True)
+            words = [f"{np.rad2deg(angle):.4g} deg" for angle in angles]
+        member = member * len(words) + keys
+        texts = [f"{one}, {two}" if one else two for one in texts for two in words]
+    found = np.unique(member[within])
+    group = np.searchsorted(found, np.clip(member, None, found[-1]))
+    return [texts[one] for one in found], group
 
 
 def predict(
@@ -151,13 +204,18 @@ def predict(
     here = {**INSTRUMENT, **model.values(rays.geometry), **(fixed or {})}
     values: dict[str, Any] = {}
     for name, value in here.items():
-        if name in layout.column:
-            entries = x[layout.column[name][rays.parent].tolist()]
-            # A slice of a single number comes out as a row, of a column as a column
-            values[name] = casadi.reshape(entries, 1, len(rays.parent))
-        else:
-            row = np.broadcast_to(np.asarray(value, dtype=float), rays.parent.shape)
-            values[name] = casadi.DM(row.copy()).T
+        row = np.broadcast_to(np.asarray(value, dtype=float), rays.parent.shape).copy()
+        if name not in layout.column:
+            values[name] = casadi.DM(row).T
+            continue
+        column = layout.column[name][rays.parent]
+        entries = x[np.maximum(column, 0).tolist()]
+        # A slice of a single number comes out as a row, of a column as a column
+        values[name] = casadi.reshape(entries, 1, len(rays.parent))
+        held = column < 0
+        if held.any():
+            is_free = casadi.DM((~held).astype(float)).T
+            values[name] = values[name] * is_free + casadi.DM(np.where(held, row, 0.0)).T
     brdf = {name: value for name, value in values.items() if name not in INSTRUMENT}
     mixing = Mixing.of(rays, observations.names)
     mueller = casadi.vec(model.mueller(brdf, rays.geometry, mixing.elements))
@@ -179,22 +237,29 @@ def predict(
 
 
 def _readings(observations: Observations, linear: Any) -> Any:
-    """Return the column of observables; DOLP is a ratio, all others are linear."""
+    """Return the column of observables: linear ones, normalised elements, DOLP."""
     import casadi
 
-    is_ratio = observations.name == "DOLP"
-    plain, ratio = np.flatnonzero(~is_ratio), np.flatnonzero(is_ratio)
+    names, is_dolp = observations.name, observations.name == "DOLP"
+    is_normal = np.isin(names, list(NORMALISED))
+    groups = [np.flatnonzero(g) for g in (~is_dolp & ~is_normal, is_normal, is_dolp)]
+
+    def of(chosen: np.ndarray, element: Any) -> Any:
+        elements = np.broadcast_to(np.asarray(element), chosen.shape)
+        return linear(elements, observations.at[chosen])
+
+    plain, normal, dolp = groups
     parts = []
     if plain.size:
-        parts.append(linear(observations.name[plain], observations.at[plain]))
-    if ratio.size:
-        at = observations.at[ratio]
-        total, q, u = (
-            linear(np.full(at.size, element), at) for element in ("M00", "M10", "M20")
-        )
+        parts.append(of(plain, names[plain]))
+    if normal.size:
+        divided = np.array([NORMALISED[name] for name in names[normal]])
+        parts.append(of(normal, divided) / of(normal, "M00"))
+    if dolp.size:
+        total, q, u = (of(dolp, element) for element in ("M00", "M10", "M20"))
         # The tiny term gives the root a derivative where polarisation vanishes
         parts.append(casadi.sqrt((q**2 + u**2) / total**2 + 1e-24))
     if len(parts) == 1:
         return parts[0]
-    order = np.argsort(np.concatenate([plain, ratio]))
+    order = np.argsort(np.concatenate(groups))
     return casadi.vertcat(*parts)[order.tolist(), :]

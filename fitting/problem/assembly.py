@@ -8,8 +8,9 @@ import numpy as np
 
 from fitting.models.analytic import AnalyticModel
 from fitting.objective.forward import INSTRUMENT, Layout, MuellerModel, predict
-from fitting.objective.objective import Objective
+from fitting.objective.objective import Objective, Prediction
 from fitting.objective.parameters import Parameter, bounded_parameter
+from fitting.problem.gauge import anchored, gauges_of
 from fitting.problem.problem import SOLVERS, Problem
 from fitting.readings.aperture import Aperture
 from fitting.readings.noise import Noise, Weights, weights_for
@@ -58,19 +59,26 @@ def assemble(
     if question.solver not in SOLVERS:
         msg = f"solver must be one of {', '.join(SOLVERS)}, got {question.solver!r}."
         raise ValueError(msg)
-    free, known = question.free, _known(question.priors)
+    known = _known(question.priors)
     observations = _above_horizon(observe(_labelled(measurement), use=use, mask=mask))
-    adapter = _adapter(model, free)
+    adapter = _adapter(model, question.free)
+    free = _with_scale(question, observations)
     outside = {name: value for name, (value, _) in known.items() if name not in free}
     held = {**question.fixed, **outside}
     others = {**held, **known, **question.bounds}
     _check_names(adapter, observations.geometry, free, others)
-    layout = Layout.of(free, observations, question.separate)
+    layout = Layout.of(
+        free, observations, question.separate, all_scans="scale" in question.free
+    )
     parameters = _parameters(adapter, observations, layout, question.bounds, known)
     parameters = _with_squares(parameters, layout, observations)
     prediction = predict(
         adapter, observations, layout, fixed=held, aperture=question.aperture
     )
+    parameters = _with_scales(parameters, layout, observations, prediction)
+    present = {**INSTRUMENT, **adapter.values(observations.geometry), **held}
+    gauges = gauges_of(layout, observations, parameters, present, tuple(question.bounds))
+    parameters = anchored(parameters, gauges)
     replicas = tuple(
         predict(one, observations, layout, fixed=held, aperture=question.aperture)
         for one in adapter.replicas
@@ -102,9 +110,42 @@ def assemble(
                 seed=question.seed,
                 objective=objective,
                 replicas=replicas,
+                gauges=gauges,
             )
         )
     return problems, {name: known[name][1] for name in outside}
+
+
+def _with_scale(question: Question, observations: Observations) -> tuple[str, ...]:
+    """Return what is free, with the scale that relative intensities bring along."""
+    given = {*question.free, *question.fixed, *question.priors}
+    bright = observations.scan[observations.at[~observations.is_ratio]]
+    if "scale" in given or not observations.relative[bright].any():
+        return question.free
+    return (*question.free, "scale")
+
+
+def _with_scales(
+    parameters: tuple[Parameter, ...],
+    layout: Layout,
+    observations: Observations,
+    prediction: Prediction,
+) -> tuple[Parameter, ...]:
+    """Start the scales of relative data where readings and curve are equally bright."""
+    if "scale" not in layout.column or not observations.relative.any():
+        return parameters
+    x = np.array([parameter.value for parameter in parameters])
+    x[[base == "scale" for base in layout.base]] = 1.0
+    predicted = prediction.function(x).full().ravel()
+    bright = ~observations.is_ratio & (observations.value > 0.0) & (predicted > 0.0)
+    entry = layout.column["scale"][observations.at]
+    started = list(parameters)
+    for index in np.unique(entry[bright & (entry >= 0)]):
+        here = bright & (entry == index)
+        ratio = float(observations.value[here].sum() / predicted[here].sum())
+        if np.isinf(parameters[index].prior_stderr):
+            started[index] = parameters[index].started_at(ratio)
+    return tuple(started)
 
 
 def _labelled(measurement: Any) -> dict[str, "xr.Dataset"]:

@@ -13,6 +13,7 @@ from fitting.objective.forward import Layout, MuellerModel, predict
 from fitting.objective.objective import Objective, Prediction
 from fitting.objective.parameters import Parameter
 from fitting.objective.uncertainty import covariance_rows
+from fitting.problem.gauge import Gauge, within_bounds
 from fitting.readings.aperture import Aperture
 from fitting.readings.noise import Weights
 from fitting.readings.observations import Observations
@@ -87,6 +88,8 @@ class Problem:
         What the solver sees.
     replicas : tuple of Prediction
         What each independent part of a simulation predicts; none of an exact model.
+    gauges : tuple of Gauge
+        Parameters that are known only up to a common factor; their anchors are held.
     """
 
     model: MuellerModel
@@ -102,6 +105,7 @@ class Problem:
     seed: int
     objective: Objective
     replicas: tuple[Prediction, ...] = ()
+    gauges: tuple[Gauge, ...] = ()
 
     def simulation_error(self, x: np.ndarray) -> np.ndarray:
         """Return what the simulation errs in the readings, shape (G, m).
@@ -237,6 +241,22 @@ def solve_likeliest(problems: Sequence[Problem]) -> tuple[Problem, Solved]:
     A few turns show which shape it is; only that one is followed to the end. A problem
     without a minimum comes last.
     """
+    problem, solved = _likeliest(problems)
+    if not problem.gauges:
+        return problem, solved
+    x = within_bounds(solved.solution.x, problem.gauges, problem.layout.base)
+    anchors = {gauge.anchor for gauge in problem.gauges}
+    parameters = tuple(
+        parameter.fixed_at(float(x[i])) if i in anchors else parameter
+        for i, parameter in enumerate(problem.parameters)
+    )
+    objective = solved.objective.with_parameters(parameters)
+    solved = replace(solved, solution=replace(solved.solution, x=x), objective=objective)
+    return replace(problem, parameters=parameters), solved
+
+
+def _likeliest(problems: Sequence[Problem]) -> tuple[Problem, Solved]:
+    """Solve the problems as far as it takes to choose one, and that one to the end."""
     if len(problems) == 1:
         return problems[0], problems[0].solve()
 

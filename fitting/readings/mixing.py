@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fitting.readings.aperture import Rays
-from fitting.readings.observations import ELEMENTS, LINEAR
+from fitting.readings.observations import ELEMENTS, LINEAR, NORMALISED
 
 if TYPE_CHECKING:
     import casadi
@@ -39,6 +39,8 @@ class Mixing:
         linear = {name for name in observables if name in LINEAR}
         if "DOLP" in observables:
             linear |= {"M00", "M10", "M20"}
+        for name in set(observables) & set(NORMALISED):
+            linear |= {"M00", NORMALISED[name]}
         shares = {}
         for name in sorted(linear):
             pattern = np.zeros((4, 4))

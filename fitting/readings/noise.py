@@ -125,7 +125,7 @@ def _instrument(
     observations: Observations, noise: Noise
 ) -> Callable[[np.ndarray], np.ndarray]:
     """Return the standard errors under an instrument noise; a ratio has it relative."""
-    is_ratio = observations.name == "DOLP"
+    is_ratio = observations.is_ratio
 
     def shape(m00: np.ndarray) -> np.ndarray:
         stderr = noise.of(m00)
@@ -174,7 +174,7 @@ def _of_file(observations: Observations) -> Weights:
             and np.ptp(seen) < 2e-3 * seen[0]
         ):
             part[members] = seen.mean()
-    relative = np.isfinite(part) & (observations.name != "DOLP")
+    relative = np.isfinite(part) & ~observations.is_ratio
     if not relative.any():
         return Weights("given", lambda _: observations.stderr, nobody, False)
 

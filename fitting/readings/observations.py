@@ -1,11 +1,12 @@
 """A goniometer scan as a flat list of numbers to fit: what, where, how well.
 
 Every observable is a linear combination of Mueller elements seen by an instrument of ideal
-polarisers, except the degree of linear polarisation, a ratio of such combinations.
+polarisers, or a ratio of such combinations: the elements divided by M00 (m10 .. m33), and
+the degree of linear polarisation. A ratio knows nothing of absolute brightness.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,15 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ELEMENTS", "LINEAR", "Geometry", "Mask", "Observations", "observe"]
+__all__ = [
+    "ELEMENTS",
+    "LINEAR",
+    "RATIOS",
+    "Geometry",
+    "Mask",
+    "Observations",
+    "observe",
+]
 
 ELEMENTS = tuple(f"M{out}{into}" for out in range(4) for into in range(4))
 
@@ -29,6 +38,10 @@ LINEAR: dict[str, dict[str, float]] = {
     "f_pp": {"M00": 0.5, "M01": -0.5, "M10": -0.5, "M11": 0.5},
 }
 
+# Normalised elements, and the element that each divides by M00
+NORMALISED = {f"m{element[1:]}": element for element in ELEMENTS[1:]}
+RATIOS = (*NORMALISED, "DOLP")
+
 Mask = Callable[["xr.Dataset"], "np.ndarray | xr.Dataset"]
 
 
@@ -42,6 +55,8 @@ class Geometry:
         Angles of the conventions page. [rad]
     wavelength : ndarray, shape (N,)
         NaN where unknown. [um]
+    source_half_angle, detector_half_angle : ndarray, shape (N,), optional
+        Half-angles of the cones of light, NaN where the scan names none. [rad]
     """
 
     theta_i: np.ndarray
@@ -49,6 +64,8 @@ class Geometry:
     dphi: np.ndarray
     phi_i: np.ndarray
     wavelength: np.ndarray
+    source_half_angle: np.ndarray | None = None
+    detector_half_angle: np.ndarray | None = None
 
     @property
     def size(self) -> int:
@@ -80,6 +97,8 @@ class Observations:
         Index into the geometry.
     value, stderr : ndarray, shape (m,)
         The number and its standard error, nan where the file gives none.
+    relative : ndarray of bool, shape (scans,)
+        Scans known up to a common factor only.
     """
 
     geometry: Geometry
@@ -89,11 +108,17 @@ class Observations:
     at: np.ndarray
     value: np.ndarray
     stderr: np.ndarray
+    relative: np.ndarray
 
     @property
     def names(self) -> tuple[str, ...]:
         """The observables that occur, in order of appearance."""
         return tuple(dict.fromkeys(self.name.tolist()))
+
+    @property
+    def is_ratio(self) -> np.ndarray:
+        """Which readings are ratios, shape (m,)."""
+        return np.isin(self.name, RATIOS)
 
     @property
     def m00(self) -> np.ndarray:
@@ -102,6 +127,19 @@ class Observations:
         is_m00 = self.name == "M00"
         there[self.at[is_m00]] = self.value[is_m00]
         return there[self.at]
+
+    @property
+    def wavelengths(self) -> np.ndarray:
+        """The known wavelengths of what is read, rising. [um]"""
+        waves = self.geometry.wavelength[self.at].round(9)
+        return np.unique(waves[np.isfinite(waves)])
+
+    @property
+    def mixes_wavelengths(self) -> bool:
+        """True if one scan holds several wavelengths."""
+        waves, scan = self.geometry.wavelength[self.at].round(9), self.scan[self.at]
+        pairs = np.unique(np.stack([scan, np.nan_to_num(waves, nan=-1.0)]), axis=1)
+        return bool(pairs.shape[1] > len(np.unique(scan)))
 
     @property
     def has_polarisation(self) -> bool:
@@ -143,8 +181,8 @@ def observe(
     together = Observations(
         geometry=Geometry(
             *(
-                np.concatenate([getattr(part.geometry, angle) for part in parts])
-                for angle in ("theta_i", "theta_s", "dphi", "phi_i", "wavelength")
+                np.concatenate([getattr(part.geometry, column.name) for part in parts])
+                for column in fields(Geometry)
             )
         ),
         scan=np.concatenate([part.scan for part in parts]),
@@ -153,9 +191,11 @@ def observe(
         at=np.concatenate([part.at + o for part, o in zip(parts, offsets, strict=False)]),
         value=np.concatenate([part.value for part in parts]),
         stderr=np.concatenate([part.stderr for part in parts]),
+        relative=np.concatenate([part.relative for part in parts]),
     )
     if not len(together.value):
-        wanted = "M00..M33, DOLP, I_s, I_p or f_ss..f_pp" if use is None else ", ".join(use)
+        any_of = "M00..M33, m10..m33, DOLP, I_s, I_p or f_ss..f_pp"
+        wanted = any_of if use is None else ", ".join(use)
         msg = f"measurement must hold numbers in {wanted}, got none. Check names and masks."
         raise ValueError(msg)
     return together
@@ -170,9 +210,8 @@ def _flatten(
 ) -> Observations:
     """Flatten one scan."""
     geometry = _geometry(label, scan)
-    known = [*LINEAR, "DOLP"]
-    # DOLP follows from M00 and M10 where they are given: it must not count again
-    derived = {"DOLP"} if {"M00", "M10"} <= set(scan.data_vars) else set()
+    known = [*LINEAR, *RATIOS]
+    derived = _derived({str(name) for name in scan.data_vars})
     names = [name for name in known if name in scan and name not in derived]
     if use is not None:
         unknown = set(use) - set(known)
@@ -199,7 +238,30 @@ def _flatten(
         at=np.concatenate([np.zeros(0, dtype=int), *(at for _, at, *_ in columns)]),
         value=np.concatenate([np.zeros(0), *(value for _, _, value, _ in columns)]),
         stderr=np.concatenate([np.zeros(0), *(stderr for *_, stderr in columns)]),
+        relative=np.array([_is_relative(label, scan)]),
     )
+
+
+def _derived(names: set[str]) -> set[str]:
+    """Return the ratios that follow from other readings: they must not count again."""
+    found = set()
+    if "M00" in names:
+        found = {ratio for ratio, element in NORMALISED.items() if element in names}
+    if {"M00", "M10"} <= names or "m10" in names:
+        found.add("DOLP")
+    return found
+
+
+def _is_relative(label: str, scan: "xr.Dataset") -> bool:
+    """Tell whether a scan is declared to be known up to a factor."""
+    quantity = scan.attrs.get("quantity", "brdf")
+    if quantity not in ("brdf", "relative"):
+        msg = (
+            f"measurement {label} must have the attribute quantity 'brdf' or 'relative', "
+            f"got {quantity!r}. Convert other quantities to a BRDF first [1/sr]."
+        )
+        raise ValueError(msg)
+    return bool(quantity == "relative")
 
 
 def _stderr(scan: "xr.Dataset", name: str, good: np.ndarray) -> np.ndarray:
@@ -248,4 +310,6 @@ def _geometry(label: str, scan: "xr.Dataset") -> Geometry:
         dphi=column("dphi", np.nan),
         phi_i=column("phi_i", 0.0),
         wavelength=column("wavelength", np.nan),
+        source_half_angle=column("source_half_angle", np.nan),
+        detector_half_angle=column("detector_half_angle", np.nan),
     )

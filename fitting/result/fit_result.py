@@ -65,6 +65,9 @@ class FitResult:
     stderr_parts : mapping of str to mapping
         Standard error of each parameter by source: "noise", "simulation" where there is
         one in the model, and each uncertain fixed parameter.
+    anchored_stderr : mapping of str to float
+        Where brightness is known only up to a factor: standard errors if the gain were
+        known to be what `values` says. They are those of `ratios`.
     problem : Problem
         What was solved, to be solved again with changes.
     """
@@ -87,6 +90,7 @@ class FitResult:
     log_likelihood: float
     n_estimated: int
     stderr_parts: Mapping[str, Mapping[str, float]]
+    anchored_stderr: Mapping[str, float]
     problem: "Problem" = field(repr=False)
 
     @cached_property
@@ -135,6 +139,30 @@ class FitResult:
             if name in self.profiles:
                 low, high = self.profiles[name].low, self.profiles[name].high
             found[name] = Estimate(value, stderr, low, high)
+        return found
+
+    @cached_property
+    def ratios(self) -> dict[str, Estimate]:
+        """What is known of brightness that is known only up to a common factor.
+
+        By name, as "diffuse_albedo / specular_gain"; empty where each is known by itself.
+        """
+        from fitting.result.likelihood import profile_likelihood
+
+        found = {}
+        for gauge in self.problem.gauges if self.converged else ():
+            anchor = self.names[gauge.anchor]
+            gain = self.values[anchor]
+            for name in (self.names[i] for i in gauge.terms):
+                value, stderr = self.values[name], self.anchored_stderr[name]
+                half = self.quantile(0.95) * stderr
+                low, high = value - half, value + half
+                if low < 0.0:
+                    profile = profile_likelihood(self, name)
+                    low, high = profile.low, profile.high
+                found[f"{name} / {anchor}"] = Estimate(
+                    *(number / gain for number in (value, stderr, low, high))
+                )
         return found
 
     @cached_property
@@ -208,6 +236,8 @@ class FitResult:
                 interval = self.profiles[name].interval
                 text = f"{value:.4g} ± {self.stderr[name]:.2g} ({interval})"
             lines.append(f"  {name:<{width}} = {text}")
+        width = max((len(name) for name in self.ratios), default=0)
+        lines += [f"  {name:<{width}} = {e}" for name, e in self.ratios.items()]
         quality = "made to fit" if self.n_estimated else f"p = {self.p_value:.2g}"
         lines.append(f"  chi2 / dof = {self.chi2:.4g} / {self.dof} ({quality})")
         lines.append(f"  noise: {self.noise}")
@@ -229,6 +259,10 @@ class FitResult:
                     "high_open": name in self.profiles and self.profiles[name].high_open,
                 }
                 for name, estimate in self.estimates.items()
+            },
+            "ratios": {
+                name: {key: _number(v) for key, v in estimate.as_dict().items()}
+                for name, estimate in self.ratios.items()
             },
             "stderr_parts": {
                 name: {source: _number(part) for source, part in parts.items()}

@@ -11,6 +11,7 @@ from fitting.objective.uncertainty import (
     covariance_rows,
     information,
 )
+from fitting.problem.gauge import Gauge
 from fitting.problem.problem import Problem, Solved
 from fitting.readings.observations import Geometry, Observations
 from fitting.result.fit_result import HARDLY_APART
@@ -27,6 +28,9 @@ def identifiability_warnings(
     """Name parameters that the data do not determine, alone or in combination."""
     labels = problem.layout.labels
     warnings = _at_bounds(problem, solved)
+    warnings += [_up_to_a_factor(problem, solved, gauge) for gauge in problem.gauges]
+    warnings += _relative_to_what_is_held(problem)
+    warnings += _unnamed_wavelengths(problem.observations)
     for direction in found.blind:
         involved = [i for i, part in enumerate(direction) if abs(part) > 0.05]
         names = _listed([labels[i] for i in involved])
@@ -61,11 +65,63 @@ def identifiability_warnings(
     return warnings
 
 
+def _relative_to_what_is_held(problem: Problem) -> list[str]:
+    """Say that what a relative scan gives holds for a gain that was not measured."""
+    observations, layout = problem.observations, problem.layout
+    bright = np.unique(observations.scan[observations.at[~observations.is_ratio]])
+    scaled = "scale" in layout.column and observations.relative[bright].all()
+    if not scaled or problem.gauges or "specular_gain" in layout.column:
+        return []
+    present = problem.model.values(observations.geometry).get("specular_gain", np.nan)
+    gain = float(np.median(problem.fixed.get("specular_gain", present)))
+    names = [
+        label
+        for label, base in zip(layout.labels, layout.base, strict=True)
+        if base in ("diffuse_albedo", "volume_albedo", "grazing_albedo")
+    ]
+    if not names or not gain > 0.0:
+        return []
+    return [
+        f"the scan is relative: {_listed(names)} holds if specular_gain is the {gain:g} at "
+        "which it is held; an absolute albedo needs a calibrated scan"
+    ]
+
+
+def _unnamed_wavelengths(observations: Observations) -> list[str]:
+    """Say that readings without a wavelength were taken with those that have one."""
+    unknown = np.isnan(observations.geometry.wavelength[observations.at])
+    waves = observations.wavelengths
+    if len(waves) != 1 or not unknown.any():
+        return []
+    return [
+        f"{int(unknown.sum())} readings name no wavelength; they were taken as of the "
+        f"{waves[0]:g} um of the others"
+    ]
+
+
+def _up_to_a_factor(problem: Problem, solved: Solved, gauge: Gauge) -> str:
+    """Say that gains and albedos are known only relative to each other."""
+    labels = problem.layout.labels
+    names = _listed([labels[i] for i in gauge.members])
+    at = problem.observations.at[~problem.observations.is_ratio]
+    relative = problem.observations.relative[problem.observations.scan[at]].any()
+    if relative:
+        return (
+            f"only a combination of {names} is determined by these data, not each; the "
+            "scan is relative, and an absolute albedo or gain needs a calibrated one"
+        )
+    cure = _cure(problem, solved, gauge.members)
+    return (
+        f"only a combination of {names} is determined by these data, not each: ratios of "
+        f"readings know gain and albedo up to a common factor; fix one{cure}"
+    )
+
+
 def misfit_warnings(problem: Problem, solved: Solved, p_value: float) -> list[str]:
     """Name a misfit that the noise does not explain."""
     x, objective = solved.solution.x, solved.objective
     residual = objective.residuals(x)
-    dof = len(residual) - len(x)
+    dof = len(residual) - len(x) + len(problem.gauges)
     warnings = []
     ratio = float((residual**2).sum()) / max(dof, 1)
     if p_value < 1e-3:

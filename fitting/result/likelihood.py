@@ -44,6 +44,10 @@ class Fitted(Protocol):
         """Standard errors by parameter name."""
 
     @property
+    def anchored_stderr(self) -> Mapping[str, float]:
+        """Those of what is known only up to a factor, if the factor were known."""
+
+    @property
     def problem(self) -> Problem:
         """What was solved."""
 
@@ -143,7 +147,7 @@ def profile_likelihood(
             tried[value] = 2.0 * (solution.cost - floor)
         return tried[value]
 
-    step = result.stderr[name]
+    step = result.anchored_stderr.get(name, result.stderr[name])
     if not np.isfinite(step) or step <= 0.0:
         step = 0.1 * max(abs(result.values[name]), parameter.scale)
     # Student's quantile for the normal one, where the noise was estimated

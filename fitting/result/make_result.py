@@ -41,11 +41,12 @@ def result_of(
     labels = problem.layout.labels
     n, m = len(labels), len(objective.data)
     residual = -objective.residuals(solution.x)
-    chi2, dof = float((residual**2).sum()), m - n
+    chi2, dof = float((residual**2).sum()), m - n + len(problem.gauges)
 
     nothing = np.full((n, n), np.nan)
     covariance, warnings = nothing, []
     parts: dict[str, dict[str, float]] = {}
+    anchored_stderr: dict[str, float] = {}
     if not solution.converged:
         warnings.append(f"no minimum was found ({solution.status}); do not use the values")
     elif dof <= 0 and problem.weights.n_estimated:
@@ -53,10 +54,18 @@ def result_of(
             f"{m} readings cannot give {n} parameters and the noise; state the noise"
         )
     else:
-        found = information(covariance_rows(objective, solution.x))
+        anchors = {gauge.anchor for gauge in problem.gauges}
+        varied = [i not in anchors for i in range(n)]
+        found = information(covariance_rows(objective, solution.x), varied)
         if problem.loss != "linear":
             found = _robust(objective, solution.x, found)
         covariance, parts = _with_uncertain(problem, solved, found, uncertain)
+        if problem.gauges:
+            given_anchor = np.sqrt(np.diag(covariance)).tolist()
+            anchored_stderr = dict(zip(labels, given_anchor, strict=True))
+            covariance = _unanchored(problem, covariance)
+            parts |= {labels[i]: {"noise": np.inf} for i in _lost(problem)}
+            found = replace(found, covariance=_unanchored(problem, found.covariance))
         p_value = np.nan
         if problem.weights.n_estimated == 0 and dof > 0:
             p_value = float(stats.chi2.sf(chi2, dof))
@@ -87,8 +96,23 @@ def result_of(
         log_likelihood=solved.log_likelihood,
         n_estimated=problem.weights.n_estimated,
         stderr_parts=parts,
+        anchored_stderr=anchored_stderr,
         problem=replace(problem, objective=objective),
     )
+
+
+def _lost(problem: Problem) -> list[int]:
+    """Return the entries that are known only up to a common factor."""
+    return [i for gauge in problem.gauges for i in gauge.members]
+
+
+def _unanchored(problem: Problem, covariance: np.ndarray) -> np.ndarray:
+    """Return the covariance with what is known up to a factor as undetermined."""
+    lost = _lost(problem)
+    wide = covariance.copy()
+    wide[lost, :] = wide[:, lost] = np.nan
+    wide[lost, lost] = np.inf
+    return wide
 
 
 def _robust(objective: Objective, x: np.ndarray, found: Information) -> Information:
@@ -159,13 +183,25 @@ def _without_simulation(
 
 
 def _models(problem: Problem, x: np.ndarray) -> dict[str, object]:
-    """Return the user's model with the fitted values, for each scan."""
+    """Return the user's model with the fitted values, for each scan and wavelength."""
+    observations = problem.observations
+    waves = observations.geometry.wavelength.round(9)
+    several = len(observations.wavelengths) > 1
     models = {}
-    for index, label in enumerate(problem.observations.labels):
-        here = np.flatnonzero(problem.observations.scan == index)
-        values = dict(problem.fixed)
-        for name, column in problem.layout.column.items():
-            values[name] = float(x[column[here[0]]])
-        brdf = {name: value for name, value in values.items() if name not in INSTRUMENT}
-        models[label] = problem.model.updated(brdf)
+    for index, label in enumerate(observations.labels):
+        here = observations.at[observations.scan[observations.at] == index]
+        if not here.size:
+            here = np.flatnonzero(observations.scan == index)
+        found, first = np.unique(waves[here], return_index=True)
+        for wave, one in zip(found, here[first], strict=True):
+            values = dict(problem.fixed)
+            for name, column in problem.layout.column.items():
+                values[name] = float(x[column[one]])
+            brdf = {name: v for name, v in values.items() if name not in INSTRUMENT}
+            if several and np.isfinite(wave):
+                # The index of a table is that of this wavelength
+                present = problem.model.values(observations.geometry)
+                brdf = {k: float(present[k][one]) for k in ("n", "kappa")} | brdf
+            name = label if len(found) == 1 else f"{label}, {wave:.9g}"
+            models[name] = problem.model.updated(brdf)
     return models

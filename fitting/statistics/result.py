@@ -15,6 +15,8 @@ from fitting.statistics.random_surface import gaussian_surface, measured_surface
 from fitting.statistics.texture import Anisotropy
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from pbrdf.surface.gaussian import GaussianSurface
     from pbrdf.surface.measured import MeasuredSurface
 
@@ -237,6 +239,16 @@ class SurfaceStatistics:
             return float(getattr(self, name).value)
         msg = f"{name} must be determined, got a failed measurement: {self.warnings[0]}"
         raise ValueError(msg)
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return a row for each estimate: value, stderr, low, high and unit."""
+        import pandas as pd
+
+        rows = {
+            name: {**estimate.as_dict(), "unit": unit}
+            for name, (estimate, unit) in self.estimates().items()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("quantity")
 
     def estimates(self) -> dict[str, tuple[Estimate, str]]:
         """Every estimate with its unit, by name."""

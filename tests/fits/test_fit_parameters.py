@@ -169,7 +169,7 @@ def test_an_index_for_each_wavelength():
     ]
     start = MicrofacetModel(Material(1.6), slope_rms=0.2, diffuse_albedo=0.1)
     result = fit(scans, start, free=("n", "diffuse_albedo"), separate={"n": "wavelength"})
-    for label, value in {"n[0.4 um]": 1.7, "n[0.8 um]": 1.5}.items():
+    for label, value in {"n[0.4]": 1.7, "n[0.8]": 1.5}.items():
         assert abs(result.values[label] - value) < 4 * result.stderr[label]
     # The tabulated material as it is, where n is not free
     fixed = fit(scans, truth, free=("diffuse_albedo",))
