@@ -5,8 +5,7 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose
 
-from fitting import Aperture, Noise, compare, f_test, profile_likelihood
-from fitting import run as fit
+from fitting import Aperture, Noise, compare, f_test, fit, profile_likelihood
 from fitting.models.analytic import AnalyticModel
 from fitting.objective.forward import Layout, predict
 from fitting.readings.masks import blocked_detector, saturated, zeros
