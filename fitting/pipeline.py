@@ -23,6 +23,7 @@ from fitting.run import fit
 from fitting.statistics.result import SurfaceStatistics
 from fitting.statistics.surface import surface_statistics
 from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene
+from pbrdf.errors import check_seed
 
 if TYPE_CHECKING:
     from data_io import Profile
@@ -131,6 +132,7 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
     ValueError
         If the scan holds several wavelengths, or nothing that the fit can use.
     """
+    check_seed(seed)
     index = Material(*material.index(_wavelength(measurement)), name=material.name)
     clock = _Clock(progress or (lambda *_: None))
 

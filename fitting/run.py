@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from pbrdf.errors import check_seed
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -114,6 +116,7 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     from fitting.problem.problem import solve_likeliest
     from fitting.result.make_result import result_of
 
+    check_seed(seed)
     question = Question(
         free=tuple(free),
         bounds=bounds or {},

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pbrdf.errors import real_array
+
 STOKES = ("I", "Q", "U", "V")
 BOUNCES = ("1", "2", "3+")
 
@@ -76,7 +78,7 @@ def direction(theta: npt.ArrayLike, phi: npt.ArrayLike) -> np.ndarray:
     >>> direction(np.pi / 2, 0.0).round(12) + 0.0
     array([1., 0., 0.])
     """
-    theta, phi = np.broadcast_arrays(theta, phi)
+    theta, phi = np.broadcast_arrays(real_array("theta", theta), real_array("phi", phi))
     sin_theta = np.sin(theta)
     return np.stack(
         [sin_theta * np.cos(phi), sin_theta * np.sin(phi), np.cos(theta)], axis=-1
@@ -97,9 +99,9 @@ def meridian_frame(
     >>> e_s + 0.0, e_p + 0.0
     (array([0., 1., 0.]), array([0., 0., 1.]))
     """
-    k = np.asarray(prop, dtype=np.float64)
+    k, phi = real_array("prop", prop), real_array("phi", phi)
     azimuth = np.where(
-        np.hypot(k[..., 0], k[..., 1]) > 0.0, np.arctan2(k[..., 1], k[..., 0]), phi
+        np.hypot(k[..., 0], k[..., 1]) == 0.0, phi, np.arctan2(k[..., 1], k[..., 0])
     )
     e_s = np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)], axis=-1)
     return e_s, np.cross(k, e_s)

@@ -10,7 +10,7 @@ import xarray as xr
 
 from pbrdf.contaminants import Drops
 from pbrdf.conventions import direction
-from pbrdf.errors import AccuracyWarning
+from pbrdf.errors import AccuracyWarning, check_seed, require
 from pbrdf.optics.materials import Material
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.run import simulate
@@ -72,7 +72,17 @@ def compare_dew(  # noqa: PLR0913  (a scene, an amount and a run)
         `contact_angle` of each state; NaN for the first, which is dry. `signature` and its
         errors are those of `signatures`.
     """
-    angles = [float(angle) for angle in contact_angles]
+    check_seed(seed)
+    angles = [
+        float(angle)
+        for angle in require(
+            "contact_angles",
+            contact_angles,
+            lambda v: (v >= 0) & (v <= np.pi),
+            "lie in [0, 3.1416] rad",
+            "Angles are radians; use np.deg2rad.",
+        )
+    ]
     scenes = [Scene(surface, substrate)] + [
         Scene(surface, substrate, Drops(contact_angle=angle, material=water, **amount))
         for angle in angles

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -50,6 +51,50 @@ class DataFileError(ValueError):
         self.column = column
 
 
+def _joined(values: npt.ArrayLike) -> npt.ArrayLike:
+    """Masked arrays in a list as one, since NumPy would drop their masks."""
+    if not isinstance(values, list | tuple):
+        return values
+    if not any(isinstance(one, np.ma.MaskedArray) for one in values):
+        return values
+    joined: np.ma.MaskedArray = np.ma.stack([np.ma.asanyarray(one) for one in values])
+    return joined
+
+
+def real_array(name: str, values: npt.ArrayLike, cure: str = "") -> np.ndarray:
+    """Return `values` as a float64 array, with NaN where a masked array hides a value.
+
+    Without a mask an array of float64 is returned as it is.
+
+    Raises
+    ------
+    TypeError
+        If the values are complex, truth values or no numbers at all.
+
+    Examples
+    --------
+    >>> real_array("heights", np.ma.array([1.0, 500.0], mask=[False, True]))
+    array([ 1., nan])
+    """
+    values = _joined(values)
+    hidden = None
+    if isinstance(values, np.ma.MaskedArray):
+        hidden, values = np.ma.getmaskarray(values), values.data
+    plain = np.asanyarray(values) if not isinstance(values, np.ndarray) else values
+    if plain.dtype.kind in "cb":
+        kind = "complex" if plain.dtype.kind == "c" else "truth"
+        msg = f"{name} must be real numbers, got {kind} values. {cure}"
+        raise TypeError(msg.strip())
+    try:
+        array = np.asarray(plain, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        msg = f"{name} must be real numbers, got {values!r}. {cure}"
+        raise TypeError(msg.strip()) from error
+    if hidden is not None and hidden.any():
+        array = np.where(hidden, np.nan, array)
+    return array
+
+
 def require(
     name: str,
     values: npt.ArrayLike,
@@ -64,7 +109,7 @@ def require(
     name : str
         Argument name as the user wrote it.
     values : array_like
-        What the user passed; NaN never passes.
+        What the user passed; NaN and masked values never pass.
     valid : callable
         Element-wise test, True where the value is allowed.
     rule : str
@@ -86,14 +131,7 @@ def require(
     ...
     ValueError: kappa must be >= 0 [1], got -1 at index 1. Use n + i kappa.
     """
-    if np.iscomplexobj(values):
-        msg = f"{name} must be real, got complex values. {cure}"
-        raise TypeError(msg)
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        msg = f"{name} must be real numbers, got {values!r}. {cure}"
-        raise TypeError(msg) from error
+    array = real_array(name, values, cure)
     wrong = ~(valid(array) & ~np.isnan(array))
     if wrong.any():
         if array.ndim == 0:
@@ -102,9 +140,50 @@ def require(
             index = tuple(int(i) for i in np.argwhere(wrong)[0])
             value = array[index]
             place = f" at index {index[0] if len(index) == 1 else index}"
-        msg = f"{name} must {rule}, got {value:.17g}{place}. {cure}"
+        hidden = isinstance(_joined(values), np.ma.MaskedArray) and np.isnan(value)
+        got = "a masked value" if hidden else f"{value:.17g}"
+        msg = f"{name} must {rule}, got {got}{place}. {cure}"
         raise ValueError(msg)
     return array
+
+
+def one_number(
+    name: str,
+    value: Any,
+    valid: Callable[[np.ndarray], np.ndarray],
+    rule: str,
+    cure: str,
+) -> float:
+    """Return one number that keeps a rule, checked as by `require`.
+
+    Examples
+    --------
+    >>> one_number("height", [1.0, 2.0], np.isfinite, "be finite [um]", "Give the height.")
+    Traceback (most recent call last):
+    ...
+    ValueError: height must be one number, got shape (2,). Give the height.
+    """
+    number = require(name, value, valid, rule, cure)
+    if number.ndim:
+        msg = f"{name} must be one number, got shape {number.shape}. {cure}"
+        raise ValueError(msg)
+    return float(number)
+
+
+def check_seed(value: Any) -> None:
+    """Refuse what is no seed: a whole number >= 0, or None to draw one.
+
+    Examples
+    --------
+    >>> check_seed(-1)
+    Traceback (most recent call last):
+    ...
+    ValueError: seed must be a whole number >= 0, got -1. Or leave it out.
+    """
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if value is not None and not (whole and value >= 0):
+        msg = f"seed must be a whole number >= 0, got {value!r}. Or leave it out."
+        raise ValueError(msg)
 
 
 class AccuracyWarning(UserWarning):

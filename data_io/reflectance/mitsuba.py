@@ -20,7 +20,7 @@ from data_io.goniometer.frames import rotation
 from data_io.reflectance.brdf_source import Brdf, from_dataset, from_model
 from data_io.text.write import complete_file
 from pbrdf.analytic import MicrofacetModel
-from pbrdf.errors import require
+from pbrdf.errors import real_array, require
 
 # Mitsuba interpolates wrongly between other numbers of wavelengths
 _WAVELENGTH_COUNTS = (1, 3, 4, 5)
@@ -175,7 +175,7 @@ def _into_file_frame(
 def _model_wavelengths(wavelength: npt.ArrayLike | None) -> np.ndarray:
     if wavelength is None:
         return np.array([_GREY_WAVELENGTH])
-    return np.atleast_1d(np.asarray(wavelength, dtype=np.float64))
+    return np.atleast_1d(real_array("wavelength", wavelength, "Give micrometres."))
 
 
 def _dataset_wavelengths(

@@ -13,7 +13,7 @@ from data_io.text.write import complete_file
 from data_io.topography.instruments import INSTRUMENT_SUFFIXES, read_instrument_profile
 from data_io.topography.profile_header import column_axes, find_columns, find_factors
 from data_io.topography.x3p import read_x3p
-from pbrdf.errors import DataFileError, require
+from pbrdf.errors import DataFileError, real_array, require
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -25,10 +25,12 @@ class Profile:
     x : array_like, shape (n,)
         Positions, strictly rising. [um]
     z : array_like, shape (n,)
-        Heights. [um]
+        Heights. [um] Points whose position or height a mask hides are left out.
 
     Raises
     ------
+    TypeError
+        If the arrays are complex or no numbers.
     ValueError
         If the arrays differ in shape, hold fewer than three points or non-finite values, or
         x does not rise.
@@ -44,9 +46,14 @@ class Profile:
 
     def __init__(self, x: npt.ArrayLike, z: npt.ArrayLike) -> None:
         cure = "Leave missing points out; a profile may be unevenly spaced."
+        pairs = (("x", x), ("z", z))
+        hidden = [np.ma.getmaskarray(np.ma.asanyarray(values)) for _, values in pairs]
+        if any(mask.any() for mask in hidden) and hidden[0].shape == hidden[1].shape:
+            known = ~(hidden[0] | hidden[1])
+            pairs = tuple((name, real_array(name, one)[known]) for name, one in pairs)  # type: ignore[assignment]
         arrays = [
             require(name, values, np.isfinite, "be finite [um]", cure).copy()
-            for name, values in (("x", x), ("z", z))
+            for name, values in pairs
         ]
         if arrays[0].ndim != 1 or arrays[0].shape != arrays[1].shape:
             msg = (

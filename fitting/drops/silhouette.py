@@ -11,7 +11,7 @@ from data_io.micrograph.levels import load_grey
 from fitting.drops.contour import DropContour, find_drop
 from fitting.drops.shapes import ShapeFit, fit_arc, fit_laplace
 from fitting.estimate import Estimate
-from pbrdf.errors import DataFileError
+from pbrdf.errors import DataFileError, require
 
 # Points nearer to the baseline are left out: the blurred corner rounds them. [blurs]
 CORNER_BLURS = 3.0
@@ -116,7 +116,14 @@ def contact_angle(
         )
         raise ValueError(msg)
     origin = np.array([top, left])
-    given = None if baseline is None else np.asarray(baseline, dtype=float) - origin
+    given = None
+    if baseline is not None:
+        cure = "Give row and column of two points in pixels."
+        given = require("baseline", baseline, np.isfinite, "be finite [pixels]", cure)
+        if given.shape != (2, 2):
+            msg = f"baseline must have shape (2, 2), got {given.shape}. {cure}"
+            raise ValueError(msg)
+        given = given - origin
     drop = find_drop(grey[top:bottom, left:right], given)
     if drop is None:
         problem = "expected a dark drop on a dark straight substrate, found none"
@@ -129,6 +136,12 @@ def _grey_array(image: npt.ArrayLike) -> np.ndarray:
     """Return grey levels in [0, 1] of an array."""
     from skimage import color, util
 
+    if np.ma.is_masked(image):
+        msg = "image must not be masked, got masked pixels. Crop to the drop (crop=)."
+        raise ValueError(msg)
+    if np.iscomplexobj(image):
+        msg = "image must be real, got complex values. Give grey levels."
+        raise TypeError(msg)
     array = np.asarray(image)
     if array.ndim == 3 and array.shape[-1] in (3, 4):
         array = color.rgb2gray(array[..., :3])

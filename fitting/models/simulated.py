@@ -26,6 +26,7 @@ from fitting.models.simulated_scene import (
 from fitting.models.simulated_trace import group_count
 from fitting.readings.observations import Geometry
 from pbrdf import MicrofacetModel, Scene
+from pbrdf.errors import check_seed, real_array
 
 if TYPE_CHECKING:
     import casadi
@@ -90,6 +91,7 @@ class SimulatedModel:
         stokes: str = "full",
         progress: Callable[[int, int], None] | None = None,
     ) -> None:
+        check_seed(seed)
         material = opaque_material(scene)
         if model is None:
             model = MicrofacetModel(material, slope_rms=facet_slope(scene))
@@ -280,6 +282,14 @@ class SimulatedModel:
         return ratio, multiple
 
 
+def _complete(name: str, values: np.ndarray | float) -> np.ndarray:
+    """Return numbers of which none is hidden by a mask."""
+    if np.ma.is_masked(values):
+        msg = f"{name} must not be masked, got masked values. Ask for what is known."
+        raise ValueError(msg)
+    return real_array(name, values)
+
+
 def _flat(
     theta_i: np.ndarray | float,
     theta_s: np.ndarray | float,
@@ -289,5 +299,6 @@ def _flat(
 ) -> tuple[Geometry, tuple[int, ...]]:
     """Return directions in a row, and the shape they came in."""
     given = (theta_i, theta_s, dphi, phi_i, np.nan if wavelength is None else wavelength)
-    columns = np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in given))
+    names = ("theta_i", "theta_s", "dphi", "phi_i", "wavelength")
+    columns = np.broadcast_arrays(*map(_complete, names, given))
     return Geometry(*(column.ravel() for column in columns)), columns[0].shape

@@ -16,6 +16,7 @@ import numpy as np
 
 from fitting.readings.observations import Geometry
 from pbrdf.conventions import direction, meridian_frame
+from pbrdf.errors import one_number
 
 __all__ = ["Aperture", "Rays", "rays_through"]
 
@@ -40,12 +41,10 @@ class Aperture:
 
     def __post_init__(self) -> None:
         for name, value in (("source", self.source), ("detector", self.detector)):
-            if not 0.0 <= value < 0.5:
-                msg = (
-                    f"{name} half-angle must lie in [0, 0.5) rad, got {value:g}. "
-                    "Angles are radians; use np.deg2rad."
-                )
-                raise ValueError(msg)
+            one_number(
+                f"{name} half-angle", value, lambda v: (v >= 0.0) & (v < 0.5),
+                "lie in [0, 0.5) rad", "Angles are radians; use np.deg2rad.",
+            )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

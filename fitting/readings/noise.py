@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fitting.readings.observations import Observations
+from pbrdf.errors import one_number
 
 __all__ = ["Noise", "Weights", "weights_for"]
 
@@ -42,6 +43,9 @@ class Noise:
     absolute: float = 0.0
 
     def __post_init__(self) -> None:
+        for name in ("relative", "absolute"):
+            value = getattr(self, name)
+            one_number(name, value, np.isfinite, "be a number", "A share, or 1/sr.")
         total = self.relative + self.absolute
         if self.relative < 0.0 or self.absolute < 0.0 or total <= 0.0:
             msg = (

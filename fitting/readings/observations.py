@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pbrdf.errors import real_array
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -222,7 +224,7 @@ def _flatten(
     keep = [mask(scan) for mask in masks]
     columns = []
     for name in names:
-        value = np.asarray(scan[name].values, dtype=float)
+        value = real_array(name, scan[name].values)
         good = np.isfinite(value)
         for kept in keep:
             if isinstance(kept, np.ndarray):
@@ -269,7 +271,7 @@ def _stderr(scan: "xr.Dataset", name: str, good: np.ndarray) -> np.ndarray:
     column = f"{name}_stderr"
     if column not in scan:
         return np.full(int(good.sum()), np.nan)
-    stderr = np.asarray(scan[column].values, dtype=float)[good]
+    stderr = real_array(column, scan[column].values)[good]
     wrong = ~(stderr > 0.0) & ~np.isnan(stderr)
     if wrong.any():
         where = np.flatnonzero(good)[wrong][0]
@@ -302,7 +304,7 @@ def _geometry(label: str, scan: "xr.Dataset") -> Geometry:
     def column(name: str, default: float) -> np.ndarray:
         if name not in scan.coords:
             return np.full(size, default)
-        return np.broadcast_to(np.asarray(scan[name].values, dtype=float), (size,)).copy()
+        return np.broadcast_to(real_array(name, scan[name].values), (size,)).copy()
 
     return Geometry(
         theta_i=column("theta_i", np.nan),

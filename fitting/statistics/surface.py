@@ -26,6 +26,7 @@ from fitting.statistics.form import (
     remove_form_profile,
 )
 from fitting.statistics.result import SurfaceStatistics
+from pbrdf.errors import real_array
 
 Array = np.ndarray
 
@@ -126,8 +127,8 @@ def _profile_statistics(
     located = getattr(profile, "located", None)
     if located is not None:
         profile = located
-    x, z = np.asarray(profile.x, dtype=float), np.asarray(profile.z, dtype=float)
-    known = ~np.isnan(z)
+    x, z = real_array("x", profile.x), real_array("z", profile.z)
+    known = ~(np.isnan(z) | np.isnan(x))
     x, z = x[known], z[known]
     _check_heights(z, degree)
     residual, removed = remove_form_profile(x, z, degree)
@@ -151,7 +152,7 @@ def _profile_statistics(
 def _map_statistics(
     surface: MapLike, degree: int, form: str, quantisation: float | None
 ) -> SurfaceStatistics:
-    heights = np.asarray(surface.heights, dtype=float)
+    heights = real_array("heights", surface.heights)
     dx, dy = np.broadcast_to(np.asarray(surface.spacing, dtype=float), (2,))
     spacing = (float(dx), float(dy))
     _check_heights(heights[~np.isnan(heights)], degree)

@@ -33,9 +33,9 @@ def checked_azimuth(name: str, phi: npt.ArrayLike) -> np.ndarray:
 def _within(angle: npt.ArrayLike, low: float, high: float) -> bool:
     """Whether a float64 array lies in a range: two passes, where `require` takes six.
 
-    False also if a NaN hides in it; `require` then names the place.
+    False also if a NaN hides in it or it has a mask; `require` then names the place.
     """
-    if not isinstance(angle, np.ndarray) or angle.dtype != np.float64 or not angle.size:
+    if type(angle) is not np.ndarray or angle.dtype != np.float64 or not angle.size:
         return False
     return bool(angle.min() >= low and angle.max() <= high)
 

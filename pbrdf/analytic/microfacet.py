@@ -18,7 +18,7 @@ from pbrdf.analytic.tables import (
     VOLUME_FORMS,
     code_of,
 )
-from pbrdf.errors import require
+from pbrdf.errors import one_number, require
 from pbrdf.kernels.microfacet import microfacet as kernel
 from pbrdf.kernels.microfacet.shadowing import Shadowing
 from pbrdf.kernels.microfacet.slopes import GAUSSIAN, Roughness, slope_norm
@@ -107,7 +107,10 @@ class MicrofacetModel:
         code_of(GRAZING_FORMS, self.grazing_form, "grazing_form")
         for name in ("volume_albedo", "volume_depolarization"):
             value = getattr(self, name)
-            require(name, value, lambda v: (v >= 0) & (v <= 1), "lie in [0, 1] [1]", "")
+            one_number(
+                name, value, lambda v: (v >= 0) & (v <= 1), "lie in [0, 1] [1]",
+                "It is a fraction.",
+            )  # fmt: skip
         if self.volume_albedo and self.material.diffuse_albedo:
             msg = (
                 f"volume_albedo must be 0 over a material with diffuse_albedo "
@@ -116,9 +119,18 @@ class MicrofacetModel:
             )
             raise ValueError(msg)
         for name in ("specular_gain", "diffuse_albedo", "grazing_albedo"):
-            require(name, getattr(self, name), lambda v: v >= 0, "be >= 0 [1]", "")
+            one_number(
+                name,
+                getattr(self, name),
+                lambda v: v >= 0,
+                "be >= 0 [1]",
+                "It is a gain.",
+            )
         for name in ("shadow_omega", "shadow_tau"):
-            require(name, getattr(self, name), lambda v: v > 0, "be > 0 [rad]", "")
+            one_number(
+                name, getattr(self, name), lambda v: v > 0, "be > 0 [rad]",
+                "Angles are radians.",
+            )  # fmt: skip
 
     def _check_slopes(self) -> None:
         """Check slope_rms and slope_distribution against each other."""

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 import numpy.typing as npt
 
-from pbrdf.errors import require
+from pbrdf.errors import real_array, require
 
 __all__ = ["SlopeTable"]
 
@@ -49,7 +49,9 @@ class SlopeTable:
             "be finite and >= 0", "",
         )  # fmt: skip
         for name, size in zip(("slope_x", "slope_y"), density.shape, strict=True):
-            grid = np.asarray(getattr(self, name), dtype=np.float64)
+            grid = require(
+                name, getattr(self, name), np.isfinite, "be finite [1]", "Give the nodes."
+            )
             steps = np.diff(grid)
             even = grid.shape == (size,) and size > 2 and steps.min() > 0
             if not even or not np.allclose(steps, steps[0], rtol=1e-6):
@@ -68,11 +70,22 @@ class SlopeTable:
         Parameters
         ----------
         slope_x, slope_y : array_like
-            Slopes of the same facets. [1]
+            Slopes of the same facets; masked ones, and NaN, are missing. [1]
         bins : int
             Cells along each axis: enough to resolve the peak, few enough to fill.
         """
-        x, y = np.ravel(slope_x), np.ravel(slope_y)
+        x, y = real_array("slope_x", slope_x), real_array("slope_y", slope_y)
+        if x.shape != y.shape:
+            msg = (
+                f"slope_x and slope_y must have one shape, got {x.shape} and {y.shape}. "
+                "Give both slopes of each facet."
+            )
+            raise ValueError(msg)
+        known = ~(np.isnan(x) | np.isnan(y))
+        x, y = x[known], y[known]
+        if not x.size:
+            msg = "slope_x must hold a slope at least, got none that is not missing."
+            raise ValueError(msg)
         reach = [1.02 * float(np.abs(v).max()) for v in (x, y)]
         limits = [(-r, r) for r in reach]
         count, edges_x, edges_y = np.histogram2d(x, y, bins=bins, range=limits)

@@ -70,14 +70,6 @@ def choice(name: str, value: Any, known: tuple[Any, ...]) -> Any:
     return value
 
 
-def check_seed(value: Any) -> None:
-    """Refuse what is no seed."""
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if value is not None and not (whole and value >= 0):
-        msg = f"seed must be a whole number >= 0, got {value!r}. Or leave it out."
-        raise ValueError(msg)
-
-
 def places(value: npt.ArrayLike, columns: tuple[int, ...]) -> np.ndarray:
     """Return positions as an array (N, 2), or (N, 3) where allowed. [um]"""
     array = require("positions", value, np.isfinite, "be finite [um]", "Give x, y of each.")

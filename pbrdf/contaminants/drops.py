@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from pbrdf.contaminants.arguments import (
     angle,
-    check_seed,
     choice,
     fraction,
     material_of,
@@ -22,6 +21,7 @@ from pbrdf.contaminants.ground import Ground
 from pbrdf.contaminants.laying import grown, lay, thrown
 from pbrdf.contaminants.sessile import ShapeMaker
 from pbrdf.contaminants.wetting import WATER_CAPILLARY_LENGTH, effective_contact_angle
+from pbrdf.errors import check_seed
 from pbrdf.optics.materials import Material
 
 SIZES = ("equal", "lognormal", "breath-figure")

@@ -8,7 +8,6 @@ import numpy.typing as npt
 
 from pbrdf.contaminants import population
 from pbrdf.contaminants.arguments import (
-    check_seed,
     choice,
     fraction,
     material_of,
@@ -19,6 +18,7 @@ from pbrdf.contaminants.arguments import (
 from pbrdf.contaminants.bodies import Settled
 from pbrdf.contaminants.ground import Ground
 from pbrdf.contaminants.shapes import Shape, sphere
+from pbrdf.errors import check_seed
 from pbrdf.optics.materials import Material
 
 

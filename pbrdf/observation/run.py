@@ -161,6 +161,7 @@ def observe(  # noqa: PLR0913  (the public signature)
         msg = f"theta_i, theta_s, dphi must be one-dimensional, got shape {shape}."
         raise ValueError(msg)
     surface, fixed = scene.surface, isinstance(scene.surface, HeightMap)
+    root = arguments.seed_sequence(seed)
     rays = arguments.count("n_rays", n_rays, arguments.BATCHES)
     drawn = arguments.count("realizations", realizations, 1)
     batched = fixed or drawn == 1
@@ -213,7 +214,6 @@ def observe(  # noqa: PLR0913  (the public signature)
     for note in notes:
         warnings.warn(note, AccuracyWarning, stacklevel=2)
 
-    root = np.random.SeedSequence(seed)
     if batched:
         shared = (
             surface if isinstance(surface, HeightMap) else surface.sample(root.spawn(1)[0])

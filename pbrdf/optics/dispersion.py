@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from pbrdf.errors import require
+from pbrdf.errors import real_array, require
 
 __all__ = ["Dispersion", "Polynomial", "Sellmeier", "Table"]
 
@@ -37,6 +37,18 @@ def require_in_range(
     )
 
 
+def _measured_rows(
+    name: str, wavelength: npt.ArrayLike, values: npt.ArrayLike
+) -> tuple[npt.ArrayLike, npt.ArrayLike]:
+    """Leave out the rows that a mask hides in either column."""
+    columns = [real_array("wavelength", wavelength), real_array(name, values)]
+    masks = [np.ma.getmaskarray(np.ma.asanyarray(one)) for one in (wavelength, values)]
+    if columns[0].shape != columns[1].shape or not any(mask.any() for mask in masks):
+        return wavelength, values
+    kept = ~(masks[0] | masks[1])
+    return columns[0][kept], columns[1][kept]
+
+
 @dataclass(frozen=True)
 class Table:
     """Piecewise linear interpolation between tabulated values.
@@ -57,7 +69,11 @@ class Table:
 
     @classmethod
     def of(cls, name: str, wavelength: npt.ArrayLike, values: npt.ArrayLike) -> "Table":
-        """Check and freeze arrays; a wavelength given twice or falling is an error."""
+        """Check and freeze arrays; a wavelength given twice or falling is an error.
+
+        Rows with a masked wavelength or value are missing: the table is without them.
+        """
+        wavelength, values = _measured_rows(name, wavelength, values)
         grid = require(
             "wavelength", wavelength, lambda v: (v > 0) & np.isfinite(v),
             "be finite and > 0 [um]", "Vacuum wavelengths are in micrometres.",

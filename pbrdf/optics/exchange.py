@@ -9,6 +9,7 @@ from math import pi
 import numpy as np
 import numpy.typing as npt
 
+from pbrdf.errors import real_array
 from pbrdf.kernels.microfacet.facet import fill_rotations
 
 __all__ = ["CONVENTIONS", "Convention", "convert_brdf"]
@@ -101,8 +102,9 @@ def convert_brdf(
     (np.float64(-0.6), 0.0)
     """
     given, wanted = _convention("source", source), _convention("target", target)
-    matrix = np.asarray(mueller, dtype=np.float64)
-    ours = np.asarray(dphi, dtype=np.float64) - given.azimuth_offset
+    matrix = real_array("mueller", mueller)
+    theta_i, theta_s = real_array("theta_i", theta_i), real_array("theta_s", theta_s)
+    ours = real_array("dphi", dphi) - given.azimuth_offset
     matrix = _flipped(matrix, given.flips)
     if given.scattering_plane != wanted.scattering_plane:
         into_plane = wanted.scattering_plane

@@ -84,6 +84,8 @@ class Material:
     ) -> "Material":
         """Material with constants tabulated against rising vacuum wavelengths [um].
 
+        Masked rows are missing, and the table is linear across them.
+
         Examples
         --------
         >>> Material.from_table(wavelength=[0.4, 0.8], n=[1.5, 1.4]).index(0.9)
@@ -138,7 +140,7 @@ class Material:
 def _at(constant: float | Dispersion, wavelength: npt.ArrayLike | None) -> np.ndarray:
     """Evaluate a dispersion; a number stays as it is."""
     if callable(constant):
-        return constant(np.asarray(wavelength, dtype=np.float64))
+        return constant(np.nan if wavelength is None else wavelength)
     return np.asarray(constant, dtype=np.float64)
 
 

@@ -3,6 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
+from pbrdf.errors import real_array
+
 __all__ = [
     "aolp",
     "coherency_eigenvalues",
@@ -27,7 +29,7 @@ COHERENCY = np.einsum("aij,bkl->abikjl", PAULI, PAULI.conj()).reshape(4, 4, 4, 4
 
 def _stokes(light: npt.ArrayLike) -> np.ndarray:
     """Stokes vector (..., 4), or the first column of Mueller matrices (..., 4, 4)."""
-    array = np.asarray(light, dtype=np.float64)
+    array = real_array("light", light)
     if array.ndim >= 2 and array.shape[-2:] == (4, 4):
         return array[..., 0]
     if array.ndim >= 1 and array.shape[-1] == 4:
@@ -160,7 +162,7 @@ def is_physical(mueller: npt.ArrayLike, tolerance: float = 1e-12) -> np.ndarray:
 
 def _matrices(mueller: npt.ArrayLike) -> np.ndarray:
     """Check the shape (..., 4, 4)."""
-    array = np.asarray(mueller, dtype=np.float64)
+    array = real_array("mueller", mueller)
     if array.ndim < 2 or array.shape[-2:] != (4, 4):
         msg = f"mueller must have shape (..., 4, 4), got {array.shape}."
         raise ValueError(msg)

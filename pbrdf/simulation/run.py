@@ -135,6 +135,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
     0.04
     """
     fixed = not arguments.varies(scene)
+    root = arguments.seed_sequence(seed)
     rays = arguments.count("n_rays", n_rays, arguments.BATCHES)
     drawn = arguments.count("realizations", realizations, 1)
     batched = fixed or drawn == 1
@@ -180,7 +181,6 @@ def simulate(  # noqa: PLR0913  (the public signature)
     for note in notes:
         warnings.warn(note, AccuracyWarning, stacklevel=2)
 
-    root = np.random.SeedSequence(seed)
     # Tallies to use again: to make a large one costs more than to clear it
     spare: deque[Tally] = deque()
     if batched:

@@ -7,6 +7,7 @@ import numpy as np
 import scipy.fft
 
 from pbrdf.errors import require
+from pbrdf.surface.drawing import generator, grid_shape
 from pbrdf.surface.heightmap import HeightMap
 
 # Amplitude, as a share of the largest, below which a wave is left out
@@ -87,11 +88,7 @@ class GaussianSurface:
                 # Plain numbers, whatever NumPy type they came in: they go into files
                 plain = checked.tolist()
                 object.__setattr__(self, name, plain if checked.ndim == 0 else tuple(plain))
-        sides = np.asarray(self.shape)
-        if sides.shape != (2,) or (sides < 8).any() or (sides != np.floor(sides)).any():
-            msg = f"shape must be (nx, ny) with at least 8 nodes each, got {self.shape}."
-            raise ValueError(msg)
-        object.__setattr__(self, "shape", tuple(int(n) for n in sides))
+        object.__setattr__(self, "shape", grid_shape(self.shape))
         periods = np.asarray(self.shape) * self._steps
         if (periods < 4 * self._lengths).any():
             msg = (
@@ -165,7 +162,7 @@ class GaussianSurface:
 
     def sample(self, seed: int | np.random.SeedSequence | None = None) -> HeightMap:
         """Draw one realisation; the same seed gives the same heights bit for bit."""
-        rng = np.random.default_rng(seed)
+        rng = generator(seed)
         nx, ny = self.shape
         passed = self._filter.shape[1]
         # Waves along y that the filter stops need no transform along x

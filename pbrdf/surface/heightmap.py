@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pbrdf.errors import require
+from pbrdf.errors import real_array, require
 from pbrdf.surface.mend import fill_holes, mirror_edges
 
 
@@ -19,7 +19,8 @@ class HeightMap:
     Parameters
     ----------
     heights : array_like, shape (nx, ny)
-        Height of node (i, j) at x = i dx, y = j dy; NaN where nothing was measured. [um]
+        Height of node (i, j) at x = i dx, y = j dy; NaN or masked where nothing was
+        measured. [um]
     spacing : float or (float, float)
         Grid steps dx, dy. [um]
     periodic : bool
@@ -29,6 +30,8 @@ class HeightMap:
 
     Raises
     ------
+    TypeError
+        If the heights are complex or no numbers.
     ValueError
         If the heights are not a two-dimensional array of at least 2 x 2 nodes, are
         infinite, or the spacing is not positive.
@@ -54,7 +57,7 @@ class HeightMap:
         labels: npt.ArrayLike | None = None,
     ) -> None:
         # An array that nobody can write to any more is taken as it is
-        grid = np.asarray(heights, dtype=np.float64)
+        grid = real_array("heights", heights, "Mark missing points with NaN or a mask.")
         if grid.flags.writeable or grid.base is not None:
             grid = grid.copy()
         if grid.ndim != 2 or min(grid.shape) < 2:
@@ -183,6 +186,9 @@ class HeightMap:
 
 def _material_numbers(labels: npt.ArrayLike, cells: tuple[int, int]) -> np.ndarray:
     """Check a label map: one whole number from 0 to 255 for each cell."""
+    # Two materials may come as a map of truth values
+    if np.asanyarray(labels).dtype == bool:
+        labels = np.asanyarray(labels).astype(np.uint8)
     numbers = require(
         "labels", labels, lambda v: (v >= 0) & (v <= 255) & (v == np.floor(v)),
         "be whole numbers in [0, 255]", "Number the materials from 0.",

@@ -9,6 +9,7 @@ from numpy.polynomial import hermite_e
 from scipy import interpolate, special
 
 from pbrdf.errors import require
+from pbrdf.surface.drawing import generator, grid_shape
 from pbrdf.surface.heightmap import HeightMap
 
 Array = np.ndarray
@@ -91,6 +92,12 @@ class MeasuredSurface:
             "lie in [-1, 1)",
             "Leave lag 0 out of the table.",
         )
+        if self.quantiles is not None:
+            require(
+                "quantiles", self.quantiles, np.isfinite, "be finite",
+                "Give heights in units of height_rms.",
+            )  # fmt: skip
+        object.__setattr__(self, "shape", grid_shape(self.shape))
         for name in ("lags", "autocorrelation", "quantiles"):
             value = getattr(self, name)
             if value is not None:
@@ -126,7 +133,7 @@ class MeasuredSurface:
 
     def sample(self, seed: int | np.random.SeedSequence | None = None) -> HeightMap:
         """Draw one realisation; the same seed gives the same heights bit for bit."""
-        rng = np.random.default_rng(seed)
+        rng = generator(seed)
         field = scipy.fft.rfft2(rng.standard_normal(self.shape), workers=1)
         field *= self._spectrum[0]
         gaussian = scipy.fft.irfft2(field, s=self.shape, workers=1, overwrite_x=True)

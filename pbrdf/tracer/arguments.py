@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import numpy as np
 import numpy.typing as npt
 
-from pbrdf.errors import require
+from pbrdf.errors import check_seed, one_number, require
 from pbrdf.kernels.paths.shading import base_strength
 from pbrdf.scene.scene import Contamination, Scene
 from pbrdf.surface import HeightMap, Surface
@@ -77,7 +77,7 @@ def azimuths(phi_i: npt.ArrayLike | str) -> tuple[list[float | None], bool]:
     """Azimuths of the source [rad], None for any, and whether they are a dimension."""
     if isinstance(phi_i, str) or np.ndim(phi_i) == 0:
         return [azimuth(phi_i)], False  # type: ignore[arg-type]
-    listed = np.asarray(phi_i)
+    listed = require("phi_i", phi_i, np.isfinite, "be finite [rad]", 'Or pass "uniform".')
     if listed.ndim > 1 or listed.size == 0:
         msg = f"phi_i must be a number or one-dimensional [rad], got shape {listed.shape}."
         raise ValueError(msg)
@@ -86,14 +86,12 @@ def azimuths(phi_i: npt.ArrayLike | str) -> tuple[list[float | None], bool]:
 
 def half_angle(value: float, angles: np.ndarray) -> float:
     """Half-angle of the source. [rad]"""
-    half = float(
-        require(
-            "source_half_angle",
-            value,
-            lambda v: (v >= 0) & (v <= WIDEST_SOURCE),
-            f"lie in [0, {WIDEST_SOURCE}] rad",
-            "Angles are radians; use np.deg2rad.",
-        )
+    half = one_number(
+        "source_half_angle",
+        value,
+        lambda v: (v >= 0) & (v <= WIDEST_SOURCE),
+        f"lie in [0, {WIDEST_SOURCE}] rad",
+        "Angles are radians; use np.deg2rad.",
     )
     if half > 0.0 and angles.max() + half >= np.pi / 2:
         msg = (
@@ -106,7 +104,7 @@ def half_angle(value: float, angles: np.ndarray) -> float:
 
 def count(name: str, value: int, least: int) -> int:
     """Return a whole number that is large enough."""
-    number = require(
+    number = one_number(
         name,
         value,
         lambda v: (v >= least) & (v == np.floor(v)) & (v < 2**53),
@@ -135,15 +133,19 @@ def stokes_count(stokes: str) -> int:
 
 def target_error(value: float) -> float:
     """Return the relative error to reach. [1]"""
-    return float(
-        require(
-            "target_rel_error",
-            value,
-            lambda v: (v > 0) & (v < 1),
-            "lie in (0, 1) [1]",
-            "0.01 asks for 1 %.",
-        )
+    return one_number(
+        "target_rel_error",
+        value,
+        lambda v: (v > 0) & (v < 1),
+        "lie in (0, 1) [1]",
+        "0.01 asks for 1 %.",
     )
+
+
+def seed_sequence(seed: int | None) -> np.random.SeedSequence:
+    """Root of all random streams of a run."""
+    check_seed(seed)
+    return np.random.SeedSequence(None if seed is None else int(seed))
 
 
 def worker_count(workers: int | None) -> int:
@@ -218,13 +220,9 @@ def varies(scene: Scene) -> bool:
 
 def in_range(name: str, value: float, low: float, high: float, cure: str) -> float:
     """One number in [low, high]."""
-    number = require(
+    return one_number(
         name, value, lambda v: (v >= low) & (v <= high), f"lie in [{low:g}, {high:g}]", cure
     )
-    if number.ndim > 0:
-        msg = f"{name} must be one number, got shape {number.shape}."
-        raise ValueError(msg)
-    return float(number)
 
 
 def one_of(name: str, value: str, known: Iterable[str]) -> str:

@@ -16,6 +16,9 @@ GUARD_HEIGHTS = 2.0
 GUARD_SHARE = 0.125
 # Least share of the area of a finite map that must be left for entry points
 LEAST_INTERIOR = 0.1
+# Periods that light may cross on its way down the height range of a periodic surface: the
+# first meetings of a line of rays take a walk over all of them
+MOST_PERIODS = 1000.0
 # As many times more lines of entry points carry the directions of a source of some width
 LINES_OF_A_DISC = 4
 NO_LABELS = np.empty((0, 0), dtype=np.uint8)
@@ -114,15 +117,33 @@ class Field:
         Raises
         ------
         ValueError
-            If less than a tenth of a finite map is left.
+            If less than a tenth of a finite map is left, or the light grazes a periodic
+            surface so that it crosses more than a thousand periods on its way down.
         """
         nx, ny = self.terrain.heights.shape
         if self.periodic:
+            self._refuse_grazing(theta_i + half_angle)
             return np.array([0.0, 0.0, nx, ny])
         known = (theta_i, np.inf if phi_i is None else phi_i, half_angle)
         if known not in self._entries:
             self._entries[known] = self._inner_rectangle(theta_i, phi_i, half_angle)
         return self._entries[known]
+
+    def _refuse_grazing(self, theta: float) -> None:
+        """Refuse light that crosses too many periods before it has come down."""
+        nx, ny = self.terrain.heights.shape
+        period = min(nx * self.pitch[0], ny * self.pitch[1])
+        reach = np.tan(theta) * self.height_range
+        if reach > MOST_PERIODS * period:
+            highest = np.arctan(MOST_PERIODS * period / self.height_range)
+            msg = (
+                f"theta_i must be at most {highest:.7f} rad over this surface "
+                f"({np.rad2deg(highest):.5f} deg), got {theta:.7f}: light would cross "
+                f"{reach / period:.3g} periods of {period:.4g} um on its way down "
+                f"{self.height_range:.3g} um of height. Take a steeper source; at grazing "
+                "every surface is a mirror, which geometric optics does not know."
+            )
+            raise ValueError(msg)
 
     def _inner_rectangle(
         self, theta_i: float, phi_i: float | None, half_angle: float
