@@ -12,7 +12,7 @@ LEAST_NODES = 8
 
 def grid_shape(shape: Any) -> tuple[int, int]:
     """Return the numbers of nodes (nx, ny) of a random surface."""
-    rule = f"be (nx, ny), whole numbers of at least {LEAST_NODES}"
+    rule = f"be (nx, ny) with at least {LEAST_NODES} nodes each, whole numbers"
     sides = require(
         "shape", shape,
         lambda v: (v >= LEAST_NODES) & (v == np.floor(v)) & np.isfinite(v),
