@@ -9,7 +9,6 @@ import numpy as np
 
 from data_io.text.files import read_texts
 from data_io.text.notation import DECIMAL, plain_notation, unquoted
-from data_io.text.units import LENGTH_UNITS, normalise_unit
 from pbrdf.errors import DataFileError
 
 COMMENT_MARKS = ("#", "%")
@@ -75,59 +74,119 @@ def find_delimiter(line: Line) -> str | None:
     return next((mark for mark in (";", "\t", ",") if mark in line.text), None)
 
 
-def column_names(header: list[Line], first: Line) -> list[str] | None:
-    """Return the names over the columns, if the header has them.
-
-    A line of units under a line of names belongs to the names.
-    """
-    delimiter = find_delimiter(first)
-    width = len(first.cells(delimiter))
-    rows = []
-    for line in header[-2:]:
-        text = line.text.strip().lstrip("".join(COMMENT_MARKS)).strip()
-        rows.append(Line(line.number, text.rstrip(delimiter)).cells(delimiter))
-    if not rows or len(rows[-1]) != width:
-        return None
-    if len(rows) == 2 and len(rows[0]) == width and all(map(_is_unit, rows[1])):
-        return [f"{name} [{unit.strip('[]() ')}]" for name, unit in zip(*rows, strict=True)]
-    return rows[-1]
-
-
-def _is_unit(cell: str) -> bool:
-    return normalise_unit(cell.strip("[]() ")) in LENGTH_UNITS
-
-
-def split_header(path: str | Path) -> tuple[list[Line], Rows]:
+def split_header(path: str | Path, block: int | None = None) -> tuple[list[Line], Rows]:
     """Divide a numeric text file into its header and its data lines.
 
-    Data begin at the first line that starts with a number; blank lines and comments among
-    them are dropped.
+    Data begin at a line that starts with a number; blank lines and comments among them are
+    dropped, and lines of words after them end a block of data. Blocks of a few numbers
+    beside a long one belong to the header.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    block : int, optional
+        Which of several blocks of data, from 1.
+
+    Raises
+    ------
+    DataFileError
+        If there are no numbers, or several blocks of data and none is chosen.
     """
     texts = unquoted(read_texts(path))
-    start = next((i for i, text in enumerate(texts) if _is_data(text)), len(texts))
-    header = [
-        Line(i, text) for i, text in enumerate(texts[:start], start=1) if text.strip()
-    ]
-    numbers = [
-        i
-        for i, text in enumerate(texts[start:], start=start + 1)
-        if (stripped := text.lstrip()) and not stripped.startswith(COMMENT_MARKS)
-    ]
-    # Some formats begin with the number of points
-    if len(numbers) > 2 and texts[numbers[0] - 1].strip() == str(len(numbers) - 1):
-        header.append(Line(numbers[0], texts[numbers[0] - 1]))
-        numbers = numbers[1:]
-    if not numbers:
+    blocks = _blocks(texts)
+    if not blocks:
         raise DataFileError(
             path,
             "expected lines of numbers, found none",
             "Give columns of numbers separated by comma, semicolon, tab or space, "
             "without separators of thousands.",
         )
+    numbers = _chosen_block(path, texts, blocks, block)
+    header = [
+        Line(i, text)
+        for i, text in enumerate(texts[: numbers[0] - 1], start=1)
+        if text.strip()
+    ]
+    # Some formats begin with the number of points
+    if len(numbers) > 2 and texts[numbers[0] - 1].strip() == str(len(numbers) - 1):
+        header.append(Line(numbers[0], texts[numbers[0] - 1]))
+        numbers = numbers[1:]
     rows = Rows(numbers, [texts[i - 1] for i in numbers])
     return header, rows._replace(
         texts=plain_notation(path, rows.texts, find_delimiter(rows.first))
     )
+
+
+def _blocks(texts: list[str]) -> list[list[int]]:
+    """Return the line numbers of each run of data lines."""
+    blocks: list[list[int]] = []
+    inside = False
+    for i, text in enumerate(texts, start=1):
+        stripped = text.lstrip()
+        if not stripped or stripped.startswith(COMMENT_MARKS):
+            continue
+        if not inside:
+            if not _is_data(text):
+                continue
+            blocks.append([])
+            inside = True
+            first = Line(i, text)
+        # Most lines are told apart by their first sign; a file may have a million
+        elif not stripped.lstrip("+-.")[:1].isdigit() and _is_words(text, first):
+            inside = False
+            continue
+        blocks[-1].append(i)
+    return blocks
+
+
+def _is_words(text: str, first: Line) -> bool:
+    """Tell whether a line among data is of words, and not a row with a fault in it."""
+    line = Line(0, _MISSING.sub("nan", text))
+    cells = line.cells(find_delimiter(line))
+    numbers = [is_number(cell) or bool(DECIMAL.fullmatch(cell)) for cell in cells]
+    if numbers[0] or not any(cells):
+        return False
+    delimiter = find_delimiter(first)
+    return not any(numbers) or len(line.cells(delimiter)) != len(first.cells(delimiter))
+
+
+def _chosen_block(
+    path: str | Path, texts: list[str], blocks: list[list[int]], wanted: int | None
+) -> list[int]:
+    """Return the lines of the block of data, of those long enough to be one."""
+    longest = max(map(len, blocks))
+    long = [b for b in blocks if len(b) >= 3 and len(b) > longest / 20]
+    if wanted is not None:
+        if not 1 <= wanted <= len(long):
+            problem = f"expected a block of data from 1 to {len(long)}, got {wanted}"
+            raise DataFileError(path, problem, "Choose another by block= (--block).")
+        return long[wanted - 1]
+    if len(long) < 2:
+        return max(blocks, key=len)
+    joined = _one_table(texts, long)
+    if joined is not None:
+        return joined
+    places = ", ".join(f"lines {b[0]} to {b[-1]}" for b in long[:6])
+    more = f" and {len(long) - 6} more" if len(long) > 6 else ""
+    problem = f"expected one block of data, found {len(long)}: {places}{more}"
+    raise DataFileError(path, problem, "Choose one by block= (--block 1).")
+
+
+def _one_table(texts: list[str], blocks: list[list[int]]) -> list[int] | None:
+    """Return the lines of a table whose header is repeated, as on the pages of a print."""
+    heads = {texts[b[0] - 2].strip() for b in blocks}
+    if len(heads) > 1:
+        return None
+    starts = [[texts[b[0] - 1], texts[b[-1] - 1]] for b in blocks]
+    first = [
+        [Line(0, text).cells(find_delimiter(Line(0, text)))[0] for text in pair]
+        for pair in starts
+    ]
+    ends = [float(c.replace(",", ".")) if is_number(c) else None for p in first for c in p]
+    known = [end for end in ends if end is not None]
+    rising = all(a < b for a, b in zip(known, known[1:], strict=False))
+    return [i for b in blocks for i in b] if rising and len(known) == len(ends) else None
 
 
 def _is_data(text: str) -> bool:
@@ -151,6 +210,7 @@ def read_numbers(
     names: Sequence[str] | None = None,
     *,
     gaps: bool = False,
+    columns: Sequence[int] | None = None,
 ) -> np.ndarray:
     """Return a rectangular block of numbers, shape (lines, columns); NaN passes.
 
@@ -163,7 +223,9 @@ def read_numbers(
     names : sequence of str, optional
         Column names for the error message; numbers from 1 by default.
     gaps : bool
-        Read empty cells and marks such as "No Data" and "***" as NaN.
+        Read empty cells, infinities and marks such as "No Data" and "***" as NaN.
+    columns : sequence of int, optional
+        Places of the columns wanted, from 0; others may hold anything. All by default.
 
     Raises
     ------
@@ -171,19 +233,26 @@ def read_numbers(
         Naming the first line and column that is not a number or is missing.
     """
     delimiter = find_delimiter(data.first)
-    block = _block(data.texts, delimiter)
+    block = _block(data.texts, delimiter, columns)
     if block is None and gaps:
         data = data._replace(texts=[_with_nan(text, delimiter) for text in data.texts])
-        block = _block(data.texts, delimiter)
+        block = _block(data.texts, delimiter, columns)
+    if block is not None and gaps:
+        # Some programs write infinity for what was not measured
+        return np.where(np.isinf(block), np.nan, block)
     if block is not None and not np.isinf(block).any():
         return block
-    raise _first_fault(path, data, delimiter, names)
+    raise _first_fault(path, data, delimiter, names, columns)
 
 
-def _block(texts: list[str], delimiter: str | None) -> np.ndarray | None:
+def _block(
+    texts: list[str], delimiter: str | None, columns: Sequence[int] | None
+) -> np.ndarray | None:
     """Return a rectangular block of numbers, or None."""
     try:
-        return np.loadtxt(texts, delimiter=delimiter, comments=None, ndmin=2)
+        return np.loadtxt(
+            texts, delimiter=delimiter, comments=None, ndmin=2, usecols=columns
+        )
     except ValueError:
         return None
 
@@ -201,6 +270,7 @@ def _first_fault(
     data: Rows,
     delimiter: str | None,
     names: Sequence[str] | None,
+    columns: Sequence[int] | None,
 ) -> DataFileError:
     """Locate what made a block of numbers unreadable."""
     width = len(data.first.cells(delimiter))
@@ -210,6 +280,8 @@ def _first_fault(
     for line in map(Line, data.numbers, data.texts):
         cells = line.cells(delimiter)
         for i, cell in enumerate(cells):
+            if columns is not None and i not in columns:
+                continue
             if not is_number(cell) or np.isinf(float(cell)):
                 name = names[i] if names and i < len(names) else str(i + 1)
                 problem = f"expected a finite number, got {cell!r}"

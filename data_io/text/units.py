@@ -1,5 +1,6 @@
 """Length units, as headers of text files and callers name them."""
 
+import math
 import re
 import warnings
 from pathlib import Path
@@ -28,9 +29,25 @@ LENGTH_UNITS = {
     "inch": 25400.0,
 }
 KNOWN_UNITS = "nm, um, mm, m"
-_SPELLED = re.compile(r"^(nano|micro|milli|)met(?:er|re)s?$")
-_SHORT = {"nano": "nm", "micro": "um", "milli": "mm", "": "m"}
-_OTHER_UNITS = {"px", "pixel", "pixels", "v", "mv", "deg", "rad", "s", "a.u.", "in"}
+# Sizes of the units of slope profiles. [rad]
+ANGLE_UNITS = {
+    "rad": 1.0,
+    "mrad": 1e-3,
+    "urad": 1e-6,
+    "nrad": 1e-9,
+    "deg": math.pi / 180,
+    "degree": math.pi / 180,
+    "degrees": math.pi / 180,
+    "°": math.pi / 180,
+    "arcmin": math.pi / 10_800,
+    "arcsec": math.pi / 648_000,
+}
+_SPELLED = re.compile(r"^(nano|micro|milli|)(met(?:er|re)|rad(?:ian)?)s?$")
+_SHORT = {"nano": "n", "micro": "u", "milli": "m", "": ""}
+_OTHER_UNITS = {
+    "px", "pixel", "pixels", "v", "mv", "s", "ms", "a.u.", "au", "arb. units", "in",
+    "counts", "cts", "%", "°c", "hz", "um/mm", "nm/mm", "um/m",
+}  # fmt: skip
 
 _NAME = r"([A-Za-zµμÅå]+)"
 # A unit in a header stands after an underscore (x_um), in brackets (z [nm], z (nm)), after
@@ -39,14 +56,15 @@ _UNIT_IN_HEADER = re.compile(
     rf"_{_NAME}\b|[\[(]\s*{_NAME}\s*[\])]|/\s*{_NAME}\b|\bunits?\s*[:=]\s*{_NAME}\b"
 )
 _AXIS_UNIT = re.compile(rf"\b([xyz])[ _-]*units?\s*[:=]\s*{_NAME}", re.IGNORECASE)
-_LAST_WORD = re.compile(r"[\s_\[(/]\s*([^\s_\[\](/)]+)\s*[\])]?\s*$")
 
 
 def normalise_unit(name: str) -> str:
     """Return a length unit in lower case and with a plain u for micro."""
     key = name.strip().replace("µ", "u").replace("μ", "u").lower()
     spelled = _SPELLED.match(key)
-    return _SHORT[spelled[1]] if spelled else key
+    if spelled:
+        return _SHORT[spelled[1]] + ("m" if spelled[2].startswith("m") else "rad")
+    return key
 
 
 def unit_factor(name: str) -> float:
@@ -56,6 +74,25 @@ def unit_factor(name: str) -> float:
         msg = f"unit must be one of {KNOWN_UNITS}, got {name!r}. Name the unit in the file."
         raise ValueError(msg)
     return LENGTH_UNITS[key]
+
+
+def unit_kind(name: str) -> str:
+    """Tell what a unit measures: ``length``, ``angle``, ``other``; empty if unknown.
+
+    Examples
+    --------
+    >>> unit_kind("microns"), unit_kind("µrad"), unit_kind("a.u."), unit_kind("raw")
+    ('length', 'angle', 'other', '')
+    """
+    key = normalise_unit(name)
+    kinds = {"length": LENGTH_UNITS, "angle": ANGLE_UNITS, "other": _OTHER_UNITS}
+    return next((kind for kind, units in kinds.items() if key in units), "")
+
+
+def unit_size(name: str) -> float:
+    """Return the size of a unit of length [um] or of angle [rad]."""
+    key = normalise_unit(name)
+    return ANGLE_UNITS[key] if key in ANGLE_UNITS else unit_factor(name)
 
 
 def warn_missing_unit(path: str | Path, *, stacklevel: int) -> None:
@@ -77,28 +114,6 @@ def header_units(text: str) -> list[str]:
     """
     found = (normalise_unit("".join(names)) for names in _UNIT_IN_HEADER.findall(text))
     return [unit for unit in found if unit in LENGTH_UNITS]
-
-
-def column_unit(path: str | Path, name: str, line: int) -> str | None:
-    """Return the length unit in a column's name: "x_um", "Z [nm]", "x / mm", "z mm", "mm".
-
-    Raises
-    ------
-    DataFileError
-        If the name states a unit that is no length, or has none of a known size.
-    """
-    found = header_units(name)
-    if found:
-        return found[0]
-    if normalise_unit(name) in LENGTH_UNITS:
-        return normalise_unit(name)
-    word = _LAST_WORD.search(name)
-    unit = normalise_unit(word[1]) if word else ""
-    if unit in _OTHER_UNITS:
-        problem = f"expected a length unit, got {word[1] if word else name!r}"
-        cure = "Convert the column, or head it with nm, um, mm or m."
-        raise DataFileError(path, problem, cure, line=line, column=name)
-    return unit if unit in LENGTH_UNITS else None
 
 
 def axis_units(texts: list[str]) -> dict[str, str]:

@@ -1,42 +1,22 @@
 """Height maps in text files: matrices, and lists of x, y, z."""
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from data_io.text.text import Line, Rows, column_names, read_numbers, split_header
-from data_io.text.units import (
-    LENGTH_UNITS,
-    axis_units,
-    column_unit,
-    normalise_unit,
-    sole_unit,
-    unit_factor,
-    warn_missing_unit,
+from data_io.text.text import Line, Rows, find_delimiter, read_numbers, split_header
+from data_io.text.units import axis_units, sole_unit, unit_factor, warn_missing_unit
+from data_io.topography.columns import (
+    Column,
+    Columns,
+    asked_columns,
+    name_columns,
+    table_width,
 )
-from data_io.topography.profile_header import column_axes
+from data_io.topography.header_fields import matrix_header
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
-
-# Header fields of text matrices: "# spacing_um = 0.5", "# dx_um: 0.5", and, as Gwyddion
-# writes them, "# Width: 10.0 µm", "# Height: ...", "# Value units: m"
-_FIELD = re.compile(
-    r"^[#%\s]*([^\W\d_][^\W\d_ ]*(?: [^\W\d_]+)*?)(?:_([A-Za-zµμ]+))?\s*[:=]\s*(.+?)\s*$"
-)
-# Gwyddion writes in the language of its user
-_TRANSLATED = {
-    "width": "breite largeur larghezza anchura largura šířka ширина",
-    "height": "höhe hauteur altezza altura výška высота",
-    "unit": "einheiten|unités|unità valore|unidades de valor|jednotky hodnot",
-}
-_ENGLISH = {
-    word: key
-    for key, words in _TRANSLATED.items()
-    for word in re.split(r"\|" if "|" in words else " ", words)
-}
-_QUANTITY = re.compile(r"^([-+0-9.,eE]+)\s*([A-Za-zµμÅå]*)$")
 
 Spacing = float | tuple[float, float]
 
@@ -56,6 +36,8 @@ def build_map(path: Path, rows: np.ndarray, steps: tuple[float, float]) -> Heigh
     if rows.ndim != 2 or min(rows.shape) < 2:
         problem = f"expected a matrix of at least 2 x 2 heights, got shape {rows.shape}"
         raise DataFileError(path, problem, "A single line of heights is a profile.")
+    # Some programs write infinity for what was not measured
+    rows = np.where(np.isinf(rows), np.nan, rows)
     if np.isnan(rows).all():
         problem = "expected heights, every point is marked missing"
         raise DataFileError(path, problem, "Export the map again.")
@@ -66,22 +48,45 @@ def build_map(path: Path, rows: np.ndarray, steps: tuple[float, float]) -> Heigh
         raise DataFileError(path, problem, cure) from error
 
 
-def read_text_map(path: Path, spacing: Spacing | None, unit: str | None) -> HeightMap:
+def read_text_map(
+    path: Path,
+    spacing: Spacing | None,
+    unit: str | None,
+    *,
+    columns: Columns | None = None,
+    block: int | None = None,
+) -> HeightMap:
     """Read a matrix of heights, or a list of x, y, z."""
-    header, data = split_header(path)
+    header, data = split_header(path, block)
     if header and header[0].text.startswith("Zygo"):
         problem = "expected positions in a unit of length, a file of Zygo's counts pixels"
         raise DataFileError(
             path, problem, "Export it as x3p, or give the binary .dat file."
         )
-    names = _list_columns(header, data.first)
-    if names is not None:
-        return _read_list(path, header, data, names, spacing, unit)
-    rows = read_numbers(path, data, gaps=True)
-    steps, factor = _matrix_header(path, header, rows.shape)
+    named = name_columns(header, data)
+    if columns is not None:
+        axes = asked_columns(path, columns, named, table_width(data))
+        if len(axes) != 3:
+            problem = f"expected three columns x, y, z for a map, got {len(axes)}"
+            raise DataFileError(path, problem, "Two columns are a profile: --kind profile.")
+        return _read_list(path, header, data, axes, spacing, unit)
+    try:
+        found = _axes(named)
+    except ValueError as error:
+        cure = "Choose by columns= (--columns 1,2,4)."
+        raise DataFileError(path, str(error), cure, line=header[-1].number) from None
+    if found is not None:
+        return _read_list(path, header, data, found, spacing, unit)
+    width = table_width(data)
+    full = len(data.first.cells(find_delimiter(data.first)))
+    rows = read_numbers(
+        path, data, gaps=True, columns=None if width == full else range(width)
+    )
+    steps, factor = matrix_header(path, header, rows.shape)
     # Three columns of unknown spacing are no map but x, y, z
     if rows.shape[1] == 3 and steps is None and spacing is None:
-        return _read_list(path, header, data, ["x", "y", "z"], spacing, unit)
+        plain = [Column(i, "", "xyz"[i], None) for i in range(3)]
+        return _read_list(path, header, data, plain, spacing, unit)
     if steps is not None and spacing is not None and not np.allclose(steps, spacing):
         problem = f"expected the spacing given, {spacing} um, the header says {steps} um"
         raise DataFileError(path, problem, "Leave the argument out or mend the header.")
@@ -92,32 +97,38 @@ def read_text_map(path: Path, spacing: Spacing | None, unit: str | None) -> Heig
     return build_map(path, rows * factor, steps or known_steps(path, spacing))
 
 
-def _list_columns(header: list[Line], first: Line) -> list[str] | None:
-    """Return the column names of a list of x, y, z, or None for a matrix."""
-    if not header:
+def _axes(columns: list[Column] | None) -> list[Column] | None:
+    """Return the columns x, y, z of a list, or None for a matrix.
+
+    Raises
+    ------
+    ValueError
+        If there are several of a kind.
+    """
+    found = {axis: [c for c in columns or [] if c.role == axis] for axis in "xyz"}
+    if not all(found.values()):
         return None
-    names = column_names(header, first)
-    if names is None:
-        text = header[-1].text.strip().lstrip("#% ")
-        names = [name for name in re.split(r"[;,\t]|\s+(?![\[(])", text) if name.strip()]
-    axes = column_axes(names)
-    return names if axes == ["x", "y", "z"] else None
+    for axis, several in found.items():
+        if len(several) > 1:
+            named = ", ".join(f"{c.name!r} ({c.place + 1})" for c in several)
+            msg = f"expected one column {axis}, found {len(several)}: {named}"
+            raise ValueError(msg)
+    return [found[axis][0] for axis in "xyz"]
 
 
 def _read_list(
     path: Path,
     header: list[Line],
     data: Rows,
-    names: list[str],
+    axes: list[Column],
     spacing: Spacing | None,
     unit: str | None,
 ) -> HeightMap:
     """Put a list of x, y, z, in any order, on its regular grid."""
-    columns = read_numbers(path, data, names, gaps=True)
-    if columns.shape[1] != 3:
-        problem = f"expected three columns x, y, z, got {columns.shape[1]}"
-        raise DataFileError(path, problem, "Keep three.", line=data.numbers[0])
-    units = _list_units(path, header, names)
+    names = [c.name or "xyz"[i] for i, c in enumerate(axes)]
+    places = [c.place for c in axes]
+    columns = read_numbers(path, data, names, gaps=True, columns=places)
+    units = _list_units(path, header, axes)
     if not units and unit is None:
         warn_missing_unit(path, stacklevel=6)
     if len(units) not in (0, 1, 3):
@@ -138,6 +149,10 @@ def _read_list(
         _grid_index(path, columns[:, k], lines, "xy"[k]) for k in range(2)
     )
     node = j * nx + i
+    if nx * ny > 20 * len(lines) + 1000:
+        problem = f"expected points on a grid, {len(lines)} points span {nx} x {ny} nodes"
+        cure = "If the columns are no x, y, z, name them by columns= (--columns)."
+        raise DataFileError(path, problem, cure)
     order = np.argsort(node, kind="stable")
     repeats = np.flatnonzero(np.diff(node[order]) == 0)
     if repeats.size:
@@ -149,12 +164,18 @@ def _read_list(
     return build_map(path, rows.reshape(ny, nx), (dx, dy))
 
 
-def _list_units(path: Path, header: list[Line], names: list[str]) -> list[str]:
+def _list_units(path: Path, header: list[Line], axes: list[Column]) -> list[str]:
     """Return the units of x, y, z that the header names: none, one for all, or three."""
     if not header:
         return []
-    at = header[-1].number
-    found = [unit for name in names if (unit := column_unit(path, name, at))]
+    for column in axes:
+        if column.unit and column.kind != "length":
+            problem = f"expected a length unit, got {column.unit!r}"
+            cure = "Convert the column, or choose others by columns= (--columns 1,2,4)."
+            raise DataFileError(
+                path, problem, cure, line=header[-1].number, column=column.name
+            )
+    found = [column.unit for column in axes if column.unit]
     if found:
         return found
     texts = [line.text for line in header]
@@ -192,48 +213,3 @@ def _grid_index(
         cure = "Resample the points to a regular grid; gaps may stay empty."
         raise DataFileError(path, problem, cure, line=line, column=axis)
     return index, float(step), count
-
-
-def _matrix_header(
-    path: Path, header: list[Line], shape: tuple[int, ...]
-) -> tuple[tuple[float, float] | None, float | None]:
-    """Return (dx, dy) and the size of the height unit that the header names. [um]"""
-    found: dict[str, float] = {}
-    factor = None
-    for line in header:
-        match = _FIELD.match(line.text)
-        if not match:
-            continue
-        key, unit_of_name, value = match[1].strip().lower(), match[2], match[3]
-        key = _ENGLISH.get(key, key)
-        if key in ("unit", "units", "value units", "z unit"):
-            if normalise_unit(value) not in LENGTH_UNITS:
-                problem = f"expected a length unit, got {value!r}"
-                cure = "Heights are needed; known units: nm, um, mm, m."
-                raise DataFileError(path, problem, cure, line=line.number, column=key)
-            factor = unit_factor(value)
-        elif key in ("spacing", "dx", "dy", "width", "height"):
-            found[key] = _length(path, line, key, unit_of_name, value)
-    dx = found.get("dx", found.get("spacing"))
-    dy = found.get("dy", found.get("spacing", dx))
-    if dx is None and {"width", "height"} <= found.keys():
-        dx, dy = found["width"] / shape[1], found["height"] / shape[0]
-    return (None if dx is None or dy is None else (dx, dy)), factor
-
-
-def _length(path: Path, line: Line, key: str, unit: str | None, value: str) -> float:
-    """Return a positive length of the header. [um]"""
-    match = _QUANTITY.match(value)
-    name = unit or (match[2] if match else "")
-    try:
-        if match is None:
-            raise ValueError(value)
-        length = float(match[1].replace(",", ".")) * unit_factor(name)
-    except ValueError as error:
-        problem = f"expected a length with its unit, got {value!r}"
-        cure = "Write for example '# spacing_um = 0.5' or '# Width: 10 um'."
-        raise DataFileError(path, problem, cure, line=line.number, column=key) from error
-    if not length > 0 or not np.isfinite(length):
-        problem = f"expected a positive length, got {value!r}"
-        raise DataFileError(path, problem, "Mend the header.", line=line.number, column=key)
-    return length

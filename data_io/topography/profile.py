@@ -8,10 +8,17 @@ import numpy as np
 import numpy.typing as npt
 
 from data_io.text.files import ZIP_MAGIC, read_bytes
-from data_io.text.text import column_names, find_delimiter, read_numbers, split_header
+from data_io.text.text import Line, read_numbers, split_header
 from data_io.text.write import complete_file
+from data_io.topography.columns import (
+    Columns,
+    column_sizes,
+    name_columns,
+    profile_columns,
+    table_width,
+)
+from data_io.topography.header_fields import profile_step
 from data_io.topography.instruments import INSTRUMENT_SUFFIXES, read_instrument_profile
-from data_io.topography.profile_header import column_axes, find_columns, find_factors
 from data_io.topography.x3p import read_x3p
 from pbrdf.errors import DataFileError, real_array, require
 
@@ -26,6 +33,8 @@ class Profile:
         Positions, strictly rising. [um]
     z : array_like, shape (n,)
         Heights. [um] Points whose position or height a mask hides are left out.
+    slope : array_like, shape (n,), optional
+        Slopes dz/dx that were measured, of which the heights are the integral. [1]
 
     Raises
     ------
@@ -43,14 +52,22 @@ class Profile:
 
     x: np.ndarray
     z: np.ndarray
+    slope: np.ndarray | None
 
-    def __init__(self, x: npt.ArrayLike, z: npt.ArrayLike) -> None:
+    def __init__(
+        self,
+        x: npt.ArrayLike,
+        z: npt.ArrayLike,
+        *,
+        slope: npt.ArrayLike | None = None,
+    ) -> None:
         cure = "Leave missing points out; a profile may be unevenly spaced."
         pairs = (("x", x), ("z", z))
         hidden = [np.ma.getmaskarray(np.ma.asanyarray(values)) for _, values in pairs]
         if any(mask.any() for mask in hidden) and hidden[0].shape == hidden[1].shape:
             known = ~(hidden[0] | hidden[1])
             pairs = tuple((name, real_array(name, one)[known]) for name, one in pairs)  # type: ignore[assignment]
+            slope = None if slope is None else real_array("slope", slope)[known]
         arrays = [
             require(name, values, np.isfinite, "be finite [um]", cure).copy()
             for name, values in pairs
@@ -72,9 +89,31 @@ class Profile:
                 f"{arrays[0][i - 1]:.9g} at index {i}. Sort points and merge equal ones."
             )
             raise ValueError(msg)
+        slopes = None
+        if slope is not None:
+            slopes = require("slope", slope, np.isfinite, "be finite [1]", cure).copy()
+            if slopes.shape != arrays[0].shape:
+                msg = f"slope must have shape {arrays[0].shape} as x, got {slopes.shape}."
+                raise ValueError(msg)
+            slopes.setflags(write=False)
+        object.__setattr__(self, "slope", slopes)
         for name, array in zip(("x", "z"), arrays, strict=True):
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+
+    @classmethod
+    def from_slope(cls, x: npt.ArrayLike, slope: npt.ArrayLike) -> "Profile":
+        """Profile of measured slopes; heights are their integral, by the trapezium rule.
+
+        Examples
+        --------
+        >>> Profile.from_slope([0.0, 1.0, 3.0], [0.1, 0.3, 0.1]).z.round(3)
+        array([0. , 0.2, 0.6])
+        """
+        position, slopes = np.asarray(x, dtype=float), np.asarray(slope, dtype=float)
+        rises = np.diff(position) * (slopes[1:] + slopes[:-1]) / 2
+        heights = np.concatenate([[0.0], np.cumsum(rises)])
+        return cls(position, heights, slope=slopes)
 
     @property
     def size(self) -> int:
@@ -104,27 +143,44 @@ class Profile:
         return f"Profile({self.size} points, length {self.length:.6g} um, {kind} spaced)"
 
 
-def read_profile(path: str | Path, *, unit: str | tuple[str, str] | None = None) -> Profile:
-    r"""Read a surface profile from a text file of two columns, or an instrument's own file.
+def read_profile(
+    path: str | Path,
+    *,
+    unit: str | tuple[str, str] | None = None,
+    columns: Columns | None = None,
+    spacing: float | None = None,
+    block: int | None = None,
+) -> Profile:
+    r"""Read a surface profile from a table of text, or an instrument's own file.
 
     Comma, semicolon, tab and space separate columns; decimals have a point, or a comma if
-    none separates columns; lines that start with # or % are comments. Units come from the
-    header (``x_um,z_um`` or ``x [mm]  z [nm]``) or from the caller. Columns headed x and z
-    may stand in any order and among others. A scan written from right to left is turned
-    round.
+    none separates columns; lines that start with # or % are comments. What the columns are
+    comes from their names and units (``x_um,z_um`` or ``x [mm]  z [nm]``) or from the
+    caller: numbers of rows and further columns are passed over, and what the header calls
+    no height is never taken for one. Points without height are left out. A scan written
+    from right to left is turned round.
 
     Parameters
     ----------
     path : str or Path
         The file.
     unit : str or (str, str), optional
-        Length unit of both columns, or of x and of z: nm, um, mm, m. Only for a file that
-        names none; without it such a file is taken as micrometres, with a warning.
+        Unit of both columns, or of x and of z: nm, um, mm, m; for a profile of slopes the
+        second is rad, mrad, urad. Only for a file that names none; without it such a file
+        is taken as micrometres, with a warning.
+    columns : str or sequence of int or str, optional
+        Numbers, from 1, or names of the columns of position and height (or slope); a
+        single one for heights that are evenly spaced.
+    spacing : float, optional
+        Distance of points, only for a single column whose header names none. [um]
+    block : int, optional
+        Which of several blocks of data, from 1.
 
     Returns
     -------
     Profile
-        Positions and heights. [um]
+        Positions and heights. [um] Of a file of slopes these are `Profile.slope`, and the
+        heights their integral.
 
     Raises
     ------
@@ -141,7 +197,7 @@ def read_profile(path: str | Path, *, unit: str | tuple[str, str] | None = None)
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder) / "edge.csv"
-    ...     _ = path.write_text("x_nm,z_nm\n0,10\n500,40\n1000,20\n")
+    ...     _ = path.write_text("No.,x_nm,z_nm\n1,0,10\n2,500,40\n3,1000,20\n")
     ...     read_profile(path)
     Profile(3 points, length 1 um, evenly spaced)
     """
@@ -151,33 +207,30 @@ def read_profile(path: str | Path, *, unit: str | tuple[str, str] | None = None)
     if suffix in INSTRUMENT_SUFFIXES:
         x, z = read_instrument_profile(path)
         return build_profile(path, x[np.isfinite(z)], z[np.isfinite(z)])
-    header, data = split_header(path)
-    names, column_x, column_z = find_columns(path, header, data.first)
-    block = read_numbers(path, data, names)
-    factor_x, factor_z = find_factors(path, header, unit, names, column_x, column_z)
-    return build_profile(
-        path,
-        block[:, column_x] * factor_x,
-        block[:, column_z] * factor_z,
-        lines=data.numbers,
-    )
+    return read_text_profile(path, unit, columns, spacing, block)
 
 
-def holds_profile(path: str | Path) -> bool:
+def holds_profile(
+    path: str | Path, *, columns: Columns | None = None, block: int | None = None
+) -> bool:
     """Tell whether a text file is a profile, and not a height map, by its columns.
 
-    A profile has one or two columns, or columns headed x and z and none headed y.
+    A profile has one or two columns, or columns that are named position and height, or
+    slope, and none that is a second position.
 
     Raises
     ------
     DataFileError
         If the file is no text, or holds no numbers.
     """
-    header, data = split_header(path)
-    if len(data.first.cells(find_delimiter(data.first))) <= 2:
+    header, data = split_header(path, block)
+    if columns is not None:
+        wanted = columns.split(",") if isinstance(columns, str) else columns
+        return len(wanted) <= 2
+    if table_width(data) <= 2:
         return True
-    axes = column_axes(column_names(header, data.first))
-    return {"x", "z"} <= set(axes) and "y" not in axes
+    roles = {column.role for column in name_columns(header, data) or []}
+    return bool(roles & {"z", "slope"}) and not {"x", "y", "z"} <= roles
 
 
 def write_profile(profile: Profile, path: str | Path) -> None:
@@ -209,15 +262,94 @@ def _read_x3p_profile(path: str | Path) -> Profile:
     )
 
 
+def read_text_profile(
+    path: str | Path,
+    unit: str | tuple[str, str] | None,
+    columns: Columns | None,
+    spacing: float | None,
+    block: int | None,
+) -> Profile:
+    """Read a profile from a table of text."""
+    header, data = split_header(path, block)
+    chosen = profile_columns(path, header, data, columns, unit_given=unit is not None)
+    used = [c for c in (chosen.position, chosen.value) if c is not None]
+    if chosen.position is None and chosen.value.kind == "angle":
+        problem = "expected positions beside slopes, found none"
+        raise DataFileError(path, problem, "Export them with their positions.")
+    names = [""] * (max(c.place for c in used) + 1)
+    for column, axis in zip(used[::-1], "zx", strict=False):
+        names[column.place] = column.name or axis
+    # The first column alone may end a row; blanks are gaps
+    rows = read_numbers(path, data, names, gaps=True, columns=[c.place for c in used])
+    size_x, size_z, is_slope = column_sizes(path, header, unit, chosen)
+    value = rows[:, -1] * size_z
+    if is_slope:
+        value = np.tan(value)
+    if chosen.position is None:
+        x = np.arange(value.size) * _step(path, header, spacing)
+    elif spacing is not None:
+        problem = "expected no spacing argument, the file has a column of positions"
+        raise DataFileError(path, problem, "Leave the argument out.")
+    else:
+        x = even_positions(rows[:, 0] * size_x)
+    known = np.isfinite(value) | ~np.isfinite(x)
+    lines = [line for line, kept in zip(data.numbers, known, strict=True) if kept]
+    return build_profile(path, x[known], value[known], lines=lines, is_slope=is_slope)
+
+
+def _step(path: str | Path, header: list[Line], spacing: float | None) -> float:
+    """Return the distance of points of a single column, from the header or the caller."""
+    found = profile_step(path, header)
+    if found is None and spacing is None:
+        problem = "expected positions or the distance of points, the file names none"
+        cure = (
+            "Give spacing= in um (--spacing-um), or in the file the line "
+            "'# spacing_um = ...'."
+        )
+        raise DataFileError(path, problem, cure)
+    if found is not None and spacing is not None and not np.isclose(found, spacing):
+        problem = f"expected the spacing given, {spacing} um, the header says {found} um"
+        raise DataFileError(path, problem, "Leave the argument out or mend the header.")
+    return float(found if spacing is None else spacing)
+
+
+def even_positions(x: np.ndarray) -> np.ndarray:
+    """Return positions without the rounding of their digits, where they lie on a grid.
+
+    A file with one decimal lists steps of 0.156 um as 0, 0.2, 0.3, 0.5. If all positions
+    lie within half their last digit of an even grid, that grid is meant.
+    """
+    if x.size < 10 or not np.isfinite(x).all():
+        return x
+    typical = float(np.median(np.abs(np.diff(x))))
+    if typical <= 0:
+        return x
+    steps = np.unique(np.round(np.abs(np.diff(x)) / typical, 6)) * typical
+    if steps.size not in (2, 3):
+        return x
+    # Steps differ by the last digit and by nothing else
+    digit = float(np.diff(steps).min())
+    number = np.arange(x.size)
+    slope, start = np.polyfit(number, x, 1)
+    grid = start + slope * number
+    rounded = np.abs(x - grid).max() < 0.51 * digit + 1e-9 * abs(slope)
+    return grid if rounded and 0.02 < digit / abs(slope) < 1.01 else x
+
+
 def build_profile(
-    path: str | Path, x: np.ndarray, z: np.ndarray, *, lines: Sequence[int] | None = None
+    path: str | Path,
+    x: np.ndarray,
+    value: np.ndarray,
+    *,
+    lines: Sequence[int] | None = None,
+    is_slope: bool = False,
 ) -> Profile:
     """Make a Profile of file content, naming the line of a point that does not fit."""
 
     def place(i: int) -> int | None:
         return lines[i] if lines else None
 
-    for name, values in (("x", x), ("z", z)):
+    for name, values in (("x", x), ("z", value)):
         missing = np.flatnonzero(~np.isfinite(values))
         if missing.size:
             raise DataFileError(
@@ -240,4 +372,6 @@ def build_profile(
             "Sort the points, merge equal ones, and cut re-entrant parts (overhangs) out."
         )
         raise DataFileError(path, problem, cure, line=place(i), column="x")
-    return Profile(x[::-1], z[::-1]) if falling else Profile(x, z)
+    if falling:
+        x, value = x[::-1], value[::-1]
+    return Profile.from_slope(x, value) if is_slope else Profile(x, value)

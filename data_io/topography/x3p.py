@@ -147,6 +147,7 @@ def _read_archive(path: Path, archive: zipfile.ZipFile) -> X3p:
     scale = document.number("Record1", "Axes", "CZ", "Increment", default=1.0)
     offset = document.number("Record1", "Axes", "CZ", "Offset", default=0.0)
     rows = (heights * scale + offset).reshape(ny, nx) * _METRE
+    rows = np.where(np.isinf(rows), np.nan, rows)
     feature = document.text("Record1", "FeatureType", default="SUR")
     return X3p(rows, steps, feature == "PRF" or ny == 1)
 
