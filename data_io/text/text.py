@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -155,18 +156,19 @@ def _chosen_block(
     path: str | Path, texts: list[str], blocks: list[list[int]], wanted: int | None
 ) -> list[int]:
     """Return the lines of the block of data, of those long enough to be one."""
-    longest = max(map(len, blocks))
-    long = [b for b in blocks if len(b) >= 3 and len(b) > longest / 20]
+    longest = max(blocks, key=len)
+    long = [b for b in blocks if len(b) >= 3 and len(b) > len(longest) / 20]
     if wanted is not None:
         if not 1 <= wanted <= len(long):
             problem = f"expected a block of data from 1 to {len(long)}, got {wanted}"
             raise DataFileError(path, problem, "Choose another by block= (--block).")
         return long[wanted - 1]
-    if len(long) < 2:
-        return max(blocks, key=len)
-    joined = _one_table(texts, long)
+    pages = [b for b in blocks if texts[b[0] - 2] == texts[longest[0] - 2]]
+    joined = _one_table(texts, pages) if len(pages) > 1 else None
     if joined is not None:
         return joined
+    if len(long) < 2:
+        return longest
     places = ", ".join(f"lines {b[0]} to {b[-1]}" for b in long[:6])
     more = f" and {len(long) - 6} more" if len(long) > 6 else ""
     problem = f"expected one block of data, found {len(long)}: {places}{more}"
@@ -175,18 +177,12 @@ def _chosen_block(
 
 def _one_table(texts: list[str], blocks: list[list[int]]) -> list[int] | None:
     """Return the lines of a table whose header is repeated, as on the pages of a print."""
-    heads = {texts[b[0] - 2].strip() for b in blocks}
-    if len(heads) > 1:
+    ends = [Line(i, texts[i - 1]) for b in blocks for i in sorted({b[0], b[-1]})]
+    cells = [line.cells(find_delimiter(line))[0].replace(",", ".") for line in ends]
+    if not all(map(is_number, cells)):
         return None
-    starts = [[texts[b[0] - 1], texts[b[-1] - 1]] for b in blocks]
-    first = [
-        [Line(0, text).cells(find_delimiter(Line(0, text)))[0] for text in pair]
-        for pair in starts
-    ]
-    ends = [float(c.replace(",", ".")) if is_number(c) else None for p in first for c in p]
-    known = [end for end in ends if end is not None]
-    rising = all(a < b for a, b in zip(known, known[1:], strict=False))
-    return [i for b in blocks for i in b] if rising and len(known) == len(ends) else None
+    rising = all(a < b for a, b in pairwise(map(float, cells)))
+    return [i for b in blocks for i in b] if rising else None
 
 
 def _is_data(text: str) -> bool:

@@ -112,11 +112,11 @@ def _unit(name: str) -> tuple[str, str | None]:
         if unit_kind(text) or (found[0][0] == "[" and text):
             return rest, text
     bare = _BRACKETS.sub(" ", name).strip()
-    found = _SPLIT.search(bare)
-    if found:
-        text = next(part for part in found.groups() if part is not None)
+    tail = _SPLIT.search(bare)
+    if tail:
+        text = next(part for part in tail.groups() if part is not None)
         if unit_kind(text):
-            return bare[: found.start()], text
+            return bare[: tail.start()], text
     if len(bare) > 1 and unit_kind(bare):
         return "", bare
     return bare, None
@@ -376,29 +376,9 @@ def column_sizes(
     named = (position.unit if position else None, value.unit)
     if not any(named):
         named = stated_units(path, header)
-    if unit is not None:
-        pair = (unit, unit) if isinstance(unit, str) else tuple(unit)
-        for name in pair:
-            unit_size(name)
-        for stated, wanted in zip(named, pair, strict=True):
-            if stated and unit_size(stated) != unit_size(wanted):
-                words = ", ".join(name or "none" for name in named)
-                problem = f"expected the unit given, {unit}, the header says {words}"
-                cure = "Leave the argument out or mend the header."
-                raise DataFileError(path, problem, cure, line=line)
-    else:
-        pair = named
+    pair = named if unit is None else _given_units(path, unit, named, line)
     is_slope = value.role == "slope" or unit_kind(pair[1] or "") == "angle"
-    if unit_kind(pair[0] or "") == "angle":
-        problem = f"expected positions in a length unit, got {pair[0]!r}"
-        raise DataFileError(path, problem, ASK, line=line)
-    if is_slope and unit_kind(pair[1] or "") != "angle":
-        problem = f"expected slopes in a unit of angle, got {pair[1] or 'none'}"
-        cure = "Head the column, for example slope_urad, or give --units mm,urad."
-        raise DataFileError(path, problem, cure, line=line, column=value.name)
-    if value.role == "z" and is_slope:
-        problem = f"expected heights in a length unit, got {pair[1]!r}"
-        raise DataFileError(path, problem, ASK, line=line, column=value.name)
+    _check_kinds(path, pair, value, is_slope=is_slope, line=line)
     missing = [name is None for name in pair]
     if position is None:
         missing = missing[1:]
@@ -409,3 +389,42 @@ def column_sizes(
     if all(missing):
         warn_missing_unit(path, stacklevel=5)
     return unit_size(pair[0] or "um"), unit_size(pair[1] or "um"), is_slope
+
+
+def _given_units(
+    path: str | Path,
+    unit: str | tuple[str, str],
+    named: tuple[str | None, str | None],
+    line: int | None,
+) -> tuple[str, str]:
+    """Return the units that the caller gave, which may not contradict the header."""
+    pair = (unit, unit) if isinstance(unit, str) else unit
+    for stated, wanted in zip(named, pair, strict=True):
+        if unit_size(wanted) and stated and unit_size(stated) != unit_size(wanted):
+            words = ", ".join(name or "none" for name in named)
+            problem = f"expected the unit given, {unit}, the header says {words}"
+            cure = "Leave the argument out or mend the header."
+            raise DataFileError(path, problem, cure, line=line)
+    return pair
+
+
+def _check_kinds(
+    path: str | Path,
+    pair: tuple[str | None, str | None],
+    value: Column,
+    *,
+    is_slope: bool,
+    line: int | None,
+) -> None:
+    """Refuse positions in radians, slopes in micrometres, heights in radians."""
+    if unit_kind(pair[0] or "") == "angle":
+        problem = f"expected positions in a length unit, got {pair[0]!r}"
+        raise DataFileError(path, problem, ASK, line=line)
+    angle = unit_kind(pair[1] or "") == "angle"
+    if is_slope and not angle:
+        problem = f"expected slopes in a unit of angle, got {pair[1] or 'none'}"
+        cure = "Head the column, for example slope_urad, or give --units mm,urad."
+        raise DataFileError(path, problem, cure, line=line, column=value.name)
+    if value.role == "z" and angle:
+        problem = f"expected heights in a length unit, got {pair[1]!r}"
+        raise DataFileError(path, problem, ASK, line=line, column=value.name)

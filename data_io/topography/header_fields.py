@@ -77,9 +77,7 @@ def _length_unit(path: str | Path, line: Line, key: str, value: str) -> str:
     return value
 
 
-def _length(
-    path: str | Path, line: Line, key: str, unit: str | None, value: str
-) -> float:
+def _length(path: str | Path, line: Line, key: str, unit: str | None, value: str) -> float:
     """Return a positive length of the header. [um]"""
     match = _QUANTITY.match(value)
     name = unit or (match[2] if match else "")

@@ -6,6 +6,7 @@ import numpy as np
 
 from data_io.text.files import read_bytes
 from data_io.text.units import unit_factor
+from data_io.topography.columns import Columns
 from data_io.topography.height_text import Spacing, build_map, known_steps, read_text_map
 from data_io.topography.instruments import read_instrument_map
 from data_io.topography.x3p import read_x3p_map
@@ -22,6 +23,8 @@ def read_height_map(
     spacing: Spacing | None = None,
     unit: str | None = None,
     channel: int | str | None = None,
+    columns: Columns | None = None,
+    block: int | None = None,
 ) -> HeightMap:
     r"""Read a height map and turn it into micrometres, axes (x, y).
 
@@ -43,6 +46,10 @@ def read_height_map(
     channel : int or str, optional
         Number or name of the channel, only for an instrument's own format; by default the
         first that holds heights.
+    columns : str or sequence of int or str, optional
+        Numbers, from 1, or names of the columns x, y, z of a text list.
+    block : int, optional
+        Which of several blocks of data in a text file, from 1.
 
     Returns
     -------
@@ -78,7 +85,7 @@ def read_height_map(
         _refuse_arguments(path, spacing, unit)
         return read_x3p_map(path)
     if path.suffix.lower() in _TEXT_SUFFIXES and channel is None:
-        return _read_any_text(path, spacing, unit)
+        return _read_any_text(path, spacing, unit, columns, block)
     if path.suffix.lower() == ".npy":
         problem = "expected a NumPy array, the file does not start like one"
         raise DataFileError(path, problem, "Write it with numpy.save.")
@@ -105,12 +112,18 @@ def _read_npy(path: Path, spacing: Spacing | None, unit: str | None) -> HeightMa
     return build_map(path, rows.astype(np.float64) * factor, known_steps(path, spacing))
 
 
-def _read_any_text(path: Path, spacing: Spacing | None, unit: str | None) -> HeightMap:
+def _read_any_text(
+    path: Path,
+    spacing: Spacing | None,
+    unit: str | None,
+    columns: Columns | None,
+    block: int | None,
+) -> HeightMap:
     """Read a text file, or one of an instrument that writes text of its own layout."""
     try:
-        return read_text_map(path, spacing, unit)
+        return read_text_map(path, spacing, unit, columns=columns, block=block)
     except DataFileError as fault:
-        if spacing is not None or unit is not None:
+        if not all(given is None for given in (spacing, unit, columns, block)):
             raise
         try:
             return read_instrument_map(path)

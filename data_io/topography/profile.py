@@ -300,7 +300,8 @@ def read_text_profile(
 def _step(path: str | Path, header: list[Line], spacing: float | None) -> float:
     """Return the distance of points of a single column, from the header or the caller."""
     found = profile_step(path, header)
-    if found is None and spacing is None:
+    step = found if spacing is None else spacing
+    if step is None:
         problem = "expected positions or the distance of points, the file names none"
         cure = (
             "Give spacing= in um (--spacing-um), or in the file the line "
@@ -310,7 +311,7 @@ def _step(path: str | Path, header: list[Line], spacing: float | None) -> float:
     if found is not None and spacing is not None and not np.isclose(found, spacing):
         problem = f"expected the spacing given, {spacing} um, the header says {found} um"
         raise DataFileError(path, problem, "Leave the argument out or mend the header.")
-    return float(found if spacing is None else spacing)
+    return float(step)
 
 
 def even_positions(x: np.ndarray) -> np.ndarray:
@@ -331,8 +332,8 @@ def even_positions(x: np.ndarray) -> np.ndarray:
     digit = float(np.diff(steps).min())
     number = np.arange(x.size)
     slope, start = np.polyfit(number, x, 1)
-    grid = start + slope * number
-    rounded = np.abs(x - grid).max() < 0.51 * digit + 1e-9 * abs(slope)
+    grid = x[0] + slope * number
+    rounded = np.abs(x - start - slope * number).max() < 0.51 * digit + 1e-9 * abs(slope)
     return grid if rounded and 0.02 < digit / abs(slope) < 1.01 else x
 
 

@@ -9,8 +9,10 @@ import typer
 
 __all__ = [
     "Azimuths",
+    "Block",
     "Blocked",
     "Channel",
+    "ColumnsOption",
     "Fold",
     "Force",
     "FormOption",
@@ -78,12 +80,32 @@ UmPerPixel = Annotated[
 Spacing = Annotated[
     float | None,
     typer.Option(
-        "--spacing-um", min=1e-6, max=1e6, help="Grid step of a map that names none."
+        "--spacing-um",
+        min=1e-6,
+        max=1e6,
+        help="Grid step of a map, or distance of points, where the file names none.",
     ),
 ]
 Unit = Annotated[
     str | None,
-    typer.Option(help="Length unit of a file that names none: nm, um, mm or m."),
+    typer.Option(
+        "--unit",
+        "--units",
+        help="Unit of a file that names none: nm, um, mm, m; of a profile also that of x "
+        "and z, mm,nm, or of x and slope, mm,urad.",
+    ),
+]
+ColumnsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--columns",
+        help="Columns of a table by number from 1, or name: position and height (2,3), or "
+        "x, y and z (1,2,4).",
+    ),
+]
+Block = Annotated[
+    int | None,
+    typer.Option("--block", min=1, help="Which of several blocks of data in a file."),
 ]
 Channel = Annotated[
     str | None,

@@ -28,6 +28,8 @@ def read_surface(
     spacing: float | None = None,
     unit: str | None = None,
     channel: str | None = None,
+    columns: str | None = None,
+    block: int | None = None,
     picture: Mapping[str, Any] = _NOTHING,
 ) -> "Profile | HeightMap":
     """Read a surface file as what it is, or as what the user says it is.
@@ -43,12 +45,14 @@ def read_surface(
     import data_io
 
     guessed = kind is Kind.auto
-    kind = _kind(path) if guessed else kind
+    kind = _kind(path, columns, block) if guessed else kind
     given = {name: value for name, value in picture.items() if value is not None}
     unused = {
         "--um-per-pixel": um_per_pixel is not None and kind is not Kind.image,
-        "--spacing-um": spacing is not None and kind is not Kind.map,
+        "--spacing-um": spacing is not None and kind is Kind.image,
         "--unit": unit is not None and kind is Kind.image,
+        "--columns": columns is not None and kind is Kind.image,
+        "--block": block is not None and kind is Kind.image,
         "--channel": channel is not None and kind is not Kind.map,
     } | {f"--{name.replace('_', '-')}": kind is not Kind.image for name in given}
     for option, wrong in unused.items():
@@ -64,13 +68,28 @@ def read_surface(
             raise ValueError(msg)
         return data_io.read_profile_image(path, um_per_pixel, **given)
     if kind is Kind.profile:
-        return data_io.read_profile(path, unit=unit)
+        return data_io.read_profile(
+            path, unit=_units(unit), columns=columns, spacing=spacing, block=block
+        )
     try:
-        return data_io.read_height_map(path, spacing=spacing, unit=unit, channel=channel)
+        return data_io.read_height_map(
+            path, spacing=spacing, unit=unit, channel=channel, columns=columns, block=block
+        )
     except data_io.NotAMapError:
         if not guessed:
             raise
-        return data_io.read_profile(path, unit=unit)
+        return data_io.read_profile(path, unit=_units(unit))
+
+
+def _units(text: str | None) -> str | tuple[str, str] | None:
+    """Return one unit, or those of x and of z or slope."""
+    if text is None or "," not in text:
+        return text
+    words = [word.strip() for word in text.split(",")]
+    if len(words) != 2:
+        msg = f"--units must be one unit or two, as in mm,nm, got {text!r}."
+        raise ValueError(msg)
+    return words[0], words[1]
 
 
 def read_scan(path: Path, *, wavelength: float | None = None) -> "xr.Dataset":
@@ -102,7 +121,7 @@ def read_scan(path: Path, *, wavelength: float | None = None) -> "xr.Dataset":
     return scan.isel(geometry=np.flatnonzero(here))
 
 
-def _kind(path: Path) -> Kind:
+def _kind(path: Path, columns: str | None, block: int | None) -> Kind:
     """Tell the kind from the name, and that of a text file from its columns."""
     suffix = path.suffix.lower()
     if suffix in _IMAGES:
@@ -112,7 +131,10 @@ def _kind(path: Path) -> Kind:
     from data_io import holds_profile
 
     try:
-        return Kind.profile if holds_profile(path) else Kind.map
+        return (
+            Kind.profile if holds_profile(path, columns=columns, block=block) else Kind.map
+        )
     except ValueError:
         # Instruments write binary files of these names too; the reader says what is wrong
         return Kind.map
+    return Kind.profile if profile else Kind.map

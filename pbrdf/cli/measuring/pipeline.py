@@ -26,6 +26,9 @@ def command(
     um_per_pixel: options.UmPerPixel = None,
     spacing: options.Spacing = None,
     unit: options.Unit = None,
+    channel: options.Channel = None,
+    columns: options.ColumnsOption = None,
+    block: options.Block = None,
     form: options.FormOption = "tilt",
     wavelength: options.Wavelength = None,
     free: options.Free = "specular_gain,diffuse_albedo",
@@ -55,8 +58,9 @@ def command(
         # A target that may not be written is refused before the work, not after
         stage = stack.enter_context(staged_folder(target, force=force))
         heights = read_surface(
-            surface, kind=kind, um_per_pixel=um_per_pixel, spacing=spacing, unit=unit
-        )
+            surface, kind=kind, um_per_pixel=um_per_pixel, spacing=spacing, unit=unit,
+            channel=channel, columns=columns, block=block,
+        )  # fmt: skip
         measurement = read_scan(scan, wavelength=wavelength)
         reading = perf_counter() - begin
 

@@ -32,6 +32,8 @@ def command(
     spacing: options.Spacing = None,
     unit: options.Unit = None,
     channel: options.Channel = None,
+    columns: options.ColumnsOption = None,
+    block: options.Block = None,
     form: options.FormOption = "tilt",
     figure: Annotated[
         Path | None,
@@ -79,7 +81,7 @@ def command(
     }
     heights = read_surface(
         surface, kind=kind, um_per_pixel=um_per_pixel, spacing=spacing, unit=unit,
-        channel=channel, picture=picture,
+        channel=channel, columns=columns, block=block, picture=picture,
     )  # fmt: skip
     if overlay is not None:
         _draw_overlay(overlay, surface, heights, force=force)
