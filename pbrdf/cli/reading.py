@@ -131,9 +131,7 @@ def _kind(path: Path, columns: str | None, block: int | None) -> Kind:
     from data_io import holds_profile
 
     try:
-        return (
-            Kind.profile if holds_profile(path, columns=columns, block=block) else Kind.map
-        )
+        profile = holds_profile(path, columns=columns, block=block)
     except ValueError:
         # Instruments write binary files of these names too; the reader says what is wrong
         return Kind.map

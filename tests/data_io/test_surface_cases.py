@@ -164,7 +164,7 @@ def test_lists_of_maps_have_further_columns_too(tmp_path):
     assert_allclose(surface.heights, np.arange(4)[:, None] - 10 * np.arange(3))
     # A number of the row, a position and a height make no grid
     table = "n um,x um,z um\n" + "\n".join(f"{i},{i / 2},{i % 7}" for i in range(200))
-    with pytest.raises(DataFileError, match="200 points span 200 x 200 nodes.*--columns"):
+    with pytest.raises(DataFileError, match=r"200 points span 200 x 200 nodes.*--columns"):
         read_height_map(write(tmp_path, table), columns="1,2,3")
 
 
