@@ -4,13 +4,14 @@
 #   make demo     recover a known coating from its micrograph and its goniometer scan
 #   make test     the tests that take seconds; test-all adds the slow ones
 #   make lint     style, types and the layer rule
+#   make stability  the table of numerical hazards with what was measured of each
 #   make bench    accuracy and speed as ratios        make studies   the study folders
 #   make docs     the documentation as a web site     make lock      renew the locks
 
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo demo-seeds test test-all lint bench studies docs lock clean
+.PHONY: help demo demo-seeds test test-all lint stability bench studies docs lock clean
 
 # The first interpreter that starts and is new enough; set PYTHON to choose another
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
@@ -61,6 +62,12 @@ lint: .venv/.dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -q tests/test_layers.py
+
+stability: .venv/.dev
+	$(BIN)/python -m pytest -q -n auto -m "not bench" --stability tests/hazards \
+		tests/laws/test_tracer_symmetry.py tests/statistical/test_tracer_error_bars.py \
+		tests/analytic/test_tracer_facets.py tests/contaminants/test_films.py \
+		tests/contaminants/test_drops_exact.py
 
 bench: .venv/.all
 	$(BIN)/python -m pytest -m bench -s

@@ -44,7 +44,7 @@ def expected_flux(surface, dir_i, n, kappa, phi_i):
         (25.0, -0.7, 0.958, 6.69),
     ],
 )
-def test_b07_every_element_of_every_bin(theta_deg, phi_i, n, kappa):
+def test_b07_every_element_of_every_bin(theta_deg, phi_i, n, kappa, measured):
     rng = np.random.default_rng(8)
     heights = 0.05 * rng.standard_normal((10, 9))
     surface = HeightMap(heights, (1.0, 0.8), periodic=True)
@@ -66,6 +66,7 @@ def test_b07_every_element_of_every_bin(theta_deg, phi_i, n, kappa):
     assert (flux[..., 0, 0] > 0).tolist() == lit.tolist()
     # Noise of entry points on a facet edge; sub-1e-9 where a bin holds whole facets only
     error = np.abs(flux - expected) / (stderr + 1e-9)
-    assert error.max() < 6
+    what = "elements of all bins, zenith included: largest deviation [standard errors]"
+    measured("B7", what, error.max(), 6)
     # The rotation elements of the bins about the zenith are there to be compared
     assert np.abs(expected[0, :, 1:3, 0]).max() > 20 * stderr[0, :, 1:3, 0].max()
