@@ -1,7 +1,7 @@
 """Shadowing and masking factors, from 0 (hidden) to 1."""
 
 from collections import namedtuple
-from math import atan2, sqrt
+from math import atan2, nan, sqrt
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.microfacet.slopes import mean_overhang, slope_along, steepness
@@ -78,7 +78,11 @@ def combined_overhangs(rule, way, lambda_i, lambda_s):
         larger = select(lambda_i > lambda_s, lambda_i, lambda_s)
         smaller = select(lambda_i > lambda_s, lambda_s, lambda_i)
         return 1.0 / (1.0 + larger + direction_weight(way) * smaller)
-    return 1.0 / ((1.0 + lambda_i) * (1.0 + lambda_s))
+    # That of 1967 has numerators of its own on top
+    if rule in (SMITH, SMITH_UNCORRELATED):
+        return 1.0 / ((1.0 + lambda_i) * (1.0 + lambda_s))
+    # A rule that is named in a table and written nowhere
+    return nan
 
 
 @jit(forceinline=True)

@@ -6,7 +6,7 @@ density of equation (17) is f / cos^4(tilt).
 """
 
 from collections import namedtuple
-from math import atan2, log, pi, sqrt
+from math import atan2, log, nan, pi, sqrt
 
 import numpy as np
 
@@ -92,8 +92,11 @@ def radial_density(rough, r2):
     if rough.law == EXPONENTIAL:
         decay = exp(-SQRT_3 * sqrt(r2 / variance + TINY))
         return 1.5 * decay / (pi * variance)
-    width2 = 2.0 * variance
-    return width2 / (pi * (width2 + r2) * (width2 + r2))
+    if rough.law == TROWBRIDGE_REITZ:
+        width2 = 2.0 * variance
+        return width2 / (pi * (width2 + r2) * (width2 + r2))
+    # A law that is named in a table and written nowhere
+    return nan
 
 
 @jit(forceinline=True)
