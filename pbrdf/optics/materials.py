@@ -30,11 +30,15 @@ class Material:
         For messages and results.
     source : str, optional
         Where the constants come from.
+    absorbs_all : bool
+        A perfect absorber: whatever it lies in or under, all light that meets it ends. It
+        has n = 1 and kappa = 0, so that nothing comes back from it in air either.
 
     Raises
     ------
     ValueError
-        If n <= 0, kappa < 0 (it is never conjugated) or the albedo leaves [0, 1].
+        If n <= 0, kappa < 0 (it is never conjugated), the albedo leaves [0, 1], or a
+        perfect absorber has an interface.
 
     Examples
     --------
@@ -49,6 +53,7 @@ class Material:
     diffuse_albedo: float = 0.0
     name: str | None = None
     source: str | None = None
+    absorbs_all: bool = False
 
     def __post_init__(self) -> None:
         if not callable(self.n):
@@ -60,6 +65,14 @@ class Material:
             "lie in [0, 1] [1]", "It is a fraction of the light.",
         )  # fmt: skip
         object.__setattr__(self, "diffuse_albedo", _scalar("diffuse_albedo", albedo))
+        bare = (self.n, self.kappa, self.diffuse_albedo) == (1.0, 0.0, 0.0)
+        if self.absorbs_all and not bare:
+            msg = (
+                f"absorbs_all must stand with n = 1 and kappa = 0, got n {self.n}, kappa "
+                f"{self.kappa} and diffuse_albedo {self.diffuse_albedo:g}. A perfect "
+                "absorber has no interface; leave it out, or the constants."
+            )
+            raise ValueError(msg)
 
     @classmethod
     def mirror(cls) -> "Material":
@@ -68,8 +81,8 @@ class Material:
 
     @classmethod
     def black(cls) -> "Material":
-        """Perfect absorber: index-matched, nothing comes back."""
-        return cls(1.0, name="black")
+        """Perfect absorber: nothing comes back, whatever it lies in or under."""
+        return cls(1.0, name="black", absorbs_all=True)
 
     @classmethod
     def from_table(

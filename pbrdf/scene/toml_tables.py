@@ -22,6 +22,7 @@ MATERIAL_KEYS = {
     "wavelength_um",
     "name",
     "file",
+    "absorbs_all",
 }
 
 
@@ -89,6 +90,8 @@ def material_table(material: Material) -> dict[str, Any]:
         return {"material": material.name}
     table: dict[str, Any] = {} if material.name is None else {"name": material.name}
     table["diffuse_albedo"] = material.diffuse_albedo
+    if material.absorbs_all:
+        table["absorbs_all"] = True
     n, kappa = material.n, material.kappa
     if isinstance(n, Entry):
         return table | {"file": f"{PREFIX}{n.address}"}

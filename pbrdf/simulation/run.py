@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from pbrdf.contaminants import Film
 from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.paths.shading import N_LEAKED
 from pbrdf.scene.scene import Scene
@@ -147,7 +148,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
     media = None
     if scene.contaminants:
         covering = contaminant_materials(scene.contaminants)
-        media = media_of(scene.materials, covering, waves)
+        films = [one.material for one in scene.contaminants if isinstance(one, Film)]
+        media = media_of(scene.materials, covering, waves, films)
     bounces = max_bounces
     if bounces is None:
         bounces = MOST_BOUNCES if media is None else MOST_EVENTS
@@ -252,7 +254,10 @@ def _realize(
     if plan.media is None:
         return target
     assert isinstance(target, Field)  # contaminants exclude the Embree route
-    return WetField.of(target, surface, scene.contaminants, plan.media, seed)
+    return WetField.of(
+        target, surface, scene.contaminants, plan.media, seed,
+        skips_deep="deep" in plan.skips,
+    )  # fmt: skip
 
 
 def _taken(spare: deque[Tally]) -> Tally | None:

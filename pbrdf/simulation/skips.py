@@ -5,6 +5,7 @@ Each skip is exact, and each can be switched off by its name, so that a test can
 
 from collections.abc import Iterable
 
+from pbrdf.kernels.bodies.media import DEEP
 from pbrdf.kernels.optics.fresnel_table import TOLERANCE
 from pbrdf.kernels.terrain.horizon import BLOCK
 from pbrdf.simulation.plan import Plan
@@ -14,6 +15,7 @@ SKIPS = {
     "sweep": "first hits on a periodic surface need no search: one pass a line finds them",
     "steep": "a ray that rises more steeply than every facet is not traced",
     "horizon": "a ray that rises above all that lies ahead of it is not traced",
+    "deep": "light with too far to go in an absorber to come out again is not followed",
     "spectra": "many wavelengths: single bounces are summed by bin and shaded once a bin",
 }
 
@@ -96,6 +98,11 @@ def _about_contaminants(plan: Plan, periodic: bool, steepest: float) -> list[str
         )
     if not plan.media.absorption.any():
         lines.append("Absorption on the way: none in any medium, not computed.")
+    elif "deep" in plan.skips:
+        lines.append(
+            f"Light with an optical depth beyond {DEEP:g} before it, of which less than "
+            "the rounding would be left: not followed."
+        )
     return lines
 
 

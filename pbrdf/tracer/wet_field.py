@@ -10,16 +10,22 @@ from scipy.spatial import cKDTree
 from pbrdf.contaminants.bodies import Bodies, Placement, place
 from pbrdf.kernels.bodies import bodies as bodies_kernel
 from pbrdf.kernels.bodies import events
+from pbrdf.kernels.bodies.media import DEEP
+from pbrdf.kernels.optics.absorbing import shares_into_absorber
 from pbrdf.kernels.paths.shading import base_strength
 from pbrdf.kernels.terrain.heightfield import block_maxima
 from pbrdf.kernels.terrain.horizon import NO_HORIZON
 from pbrdf.optics.materials import Material
 from pbrdf.surface.heightmap import HeightMap
 from pbrdf.tracer.field import Field
+from pbrdf.tracer.validity import LEAST_SIZE_PARAMETER
 
-# From this kappa on light dies within a few wavelengths of the surface: the body is opaque,
-# and directions inside of weaker absorbers are those of a transparent one
-OPAQUE_KAPPA = 0.01
+# Without a wavelength bodies are as large against it as geometric optics asks for: no light
+# then crosses one of this kappa, whose optical depth is 4 kappa times the size parameter
+OPAQUE_KAPPA = DEEP / (4.0 * LEAST_SIZE_PARAMETER)
+# Nodes for the light that a diffuse base sends into an absorber
+NODES, WEIGHTS = (0.5 * part for part in np.polynomial.legendre.leggauss(64))
+NODES = NODES + 0.5
 # Cells of the grid of bodies: so many for each body, and so many in any case
 CELLS_PER_BODY = 4
 FEWEST_CELLS = 12
@@ -54,10 +60,12 @@ class WetField:
         contaminants: Sequence[Any],
         media: events.Media,
         seed: np.random.SeedSequence,
+        *,
+        skips_deep: bool = True,
     ) -> "WetField":
         """Lay the contaminants on a surface."""
         placement = place(contaminants, surface, seed)
-        world, top = world_of(field, placement, media)
+        world, top = world_of(field, placement, media, skips_deep=skips_deep)
         return cls(
             field=replace(field, terrain=field.terrain._replace(z_top=top)),
             world=world,
@@ -79,51 +87,99 @@ def media_of(
     substrate: Sequence[Material],
     contaminants: Sequence[Material],
     waves: np.ndarray | None,
+    films: Sequence[Material | str] = (),
 ) -> events.Media:
     """Optical constants of air, contaminants and solids at each wavelength.
+
+    `films` are those of the contaminants that a film consists of: it may be thin.
 
     Raises
     ------
     ValueError
-        If a transparent body absorbs and no wavelength tells how much.
+        If a body absorbs and no wavelength tells how much, or has a diffuse base under an
+        interface that absorbs.
     """
     count = 1 if waves is None or waves.ndim == 0 else waves.size
     n_media, first = len(contaminants) + 1, len(substrate)
     solids = [*substrate, *contaminants]
     n = np.ones((count, n_media))
-    absorption = np.zeros((count, n_media))
+    kappa, absorption = np.zeros((2, count, n_media))
     solid = np.full((count, n_media), -1)
-    solid_n, solid_kappa = np.empty((count, len(solids))), np.empty((count, len(solids)))
+    solid_n, solid_kappa = np.empty((2, count, len(solids)))
     for column, material in enumerate(solids):
         solid_n[:, column], solid_kappa[:, column] = material.indices(waves)
     for medium, material in enumerate(contaminants, start=1):
         column = first + medium - 1
-        index, kappa = solid_n[:, column], solid_kappa[:, column]
-        opaque = (kappa >= OPAQUE_KAPPA) | np.isinf(index)
-        opaque |= material == Material.black() or material.diffuse_albedo > 0.0
+        index, absorbs = solid_n[:, column], solid_kappa[:, column]
+        opaque = np.isinf(index) | material.absorbs_all | (material.diffuse_albedo > 0.0)
+        if material.diffuse_albedo > 0.0 and absorbs.any():
+            msg = (
+                f"kappa must be 0 over a diffuse base [1], got {absorbs.max():g} and "
+                f"diffuse_albedo {material.diffuse_albedo:g}. "
+                "Light does not reach a base under an absorber."
+            )
+            raise ValueError(msg)
+        if waves is None:
+            opaque |= (absorbs >= OPAQUE_KAPPA) & (material not in films)
+            _check_transparent(absorbs[~opaque])
         solid[opaque, medium] = column
         n[~opaque, medium] = index[~opaque]
-        if kappa[~opaque].any():
-            if waves is None:
-                msg = (
-                    f"wavelength must be given [um] where a body absorbs, got None and "
-                    f"kappa {kappa[~opaque].max():g}. Or take a material with kappa = 0."
-                )
-                raise ValueError(msg)
-            absorption[:, medium] = np.where(opaque, 0.0, 4 * np.pi * kappa / waves)
-    base = np.zeros((count, len(solids), n_media))
+        kappa[~opaque, medium] = absorbs[~opaque]
+        if waves is not None:
+            absorption[:, medium] = 4 * np.pi * kappa[:, medium] / waves
+    base, tail = np.zeros((2, count, len(solids), n_media))
     for w, column, medium in np.ndindex(*base.shape):
         albedo = solids[column].diffuse_albedo
-        ratio = solid_n[w, column] / n[w, medium]
-        base[w, column, medium] = base_strength(
-            albedo, ratio, solid_kappa[w, column] / n[w, medium]
+        if kappa[w, medium] > 0.0 and albedo > 0.0:
+            base[w, column, medium], tail[w, column, medium] = _base_under_absorber(
+                albedo,
+                float(solid_n[w, column]),
+                float(n[w, medium]),
+                float(kappa[w, medium]),
+            )
+        else:
+            base[w, column, medium] = base_strength(
+                albedo,
+                solid_n[w, column] / n[w, medium],
+                solid_kappa[w, column] / n[w, medium],
+            )
+    black = np.array([material.absorbs_all for material in solids])
+    return events.Media(
+        n, kappa, absorption, solid, solid_n, solid_kappa, black, base, tail
+    )
+
+
+def _check_transparent(kappa: np.ndarray) -> None:
+    """Refuse absorption that cannot be told without a wavelength."""
+    if kappa.any():
+        msg = (
+            f"wavelength must be given [um] where a body absorbs, got None and "
+            f"kappa {kappa.max():g}. Or take a material with kappa = 0."
         )
-    black = np.array([material == Material.black() for material in solids])
-    return events.Media(n, absorption, solid, solid_n, solid_kappa, base, black)
+        raise ValueError(msg)
+
+
+def _base_under_absorber(
+    albedo: float, n_base: float, n: float, kappa: float
+) -> tuple[float, float]:
+    """Strength of a diffuse base under an absorber, and share of its samples in the tail.
+
+    The strength is albedo / (n_base² (1 - albedo F_i)), by square of the wave vector along
+    the interface, F_i what the interface throws back into the base. The tail is what an
+    absorber takes in beyond the angle of total reflection of a medium that does not absorb.
+    """
+    top, middle = n_base**2, min(n, n_base) ** 2
+    inner, outer = (
+        (high - low) / top
+        * shares_into_absorber(n_base, n, kappa, low, high, NODES, WEIGHTS)
+        for low, high in ((0.0, middle), (middle, top))
+    )  # fmt: skip
+    sent = inner + outer
+    return albedo / (top * (1.0 - albedo * (1.0 - sent))), outer / sent
 
 
 def world_of(
-    field: Field, placement: Placement, media: events.Media
+    field: Field, placement: Placement, media: events.Media, *, skips_deep: bool = True
 ) -> tuple[events.World, float]:
     """Scene for the kernels, and a height above everything in it. [um]"""
     terrain = field.terrain
@@ -148,7 +204,8 @@ def world_of(
     bodies = _register(placement.bodies, field)
     if len(bodies.z) > 0:
         top = max(top, bodies.z_high)
-    return events.World(terrain, film, bodies, media), float(top)
+    deep = DEEP if skips_deep else np.inf
+    return events.World(terrain, film, bodies, media, deep), float(top)
 
 
 def _register(bodies: Bodies, field: Field) -> bodies_kernel.Bodies:

@@ -123,7 +123,9 @@ def test_c5b_absorbing_film_on_a_mirror(theta_deg):
         Material.mirror(), Film(thickness=thickness, material=Material(1.333, kappa)),
         theta, n_rays=2000, n_theta=9, n_dphi=4, wavelength=wavelength,
     )  # fmt: skip
-    assert_within(mean, stderr, film_matrix(theta, 1.333, None, a2=0.5))
+    expected = film_matrix(theta, 1.333, None, a2=0.5)
+    # Absorption turns the phase between s and p a little, which this series leaves out
+    assert_within(mean, stderr, expected, floor=2.0 * kappa)
     assert assert_closed(result) < 2e-4
 
 

@@ -15,7 +15,9 @@ START, FACET, CELL_I, CELL_J, CELL_U, CELL_V, RATE = 9, 10, 11, 12, 13, 14, 15
 # Events so far; the body just met, with its axis; the bodies it is inside of, likewise
 EVENTS, LEFT, N_INSIDE, INSIDE = 16, 17, 20, 21
 MAX_INSIDE = 8
-MUELLER = INSIDE + 3 * MAX_INSIDE  # its matrix, row after row
+# The real index along its path: that of the medium, and a little more in one that absorbs
+INDEX = INSIDE + 3 * MAX_INSIDE
+MUELLER = INDEX + 1  # its matrix, row after row
 N_STATE = MUELLER + 16
 
 FREE, ON_GROUND, ON_FILM, ON_BODY = 0, 1, 2, 3

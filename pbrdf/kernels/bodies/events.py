@@ -71,26 +71,14 @@ HIT_BODY, HIT_I, HIT_J, HIT_FACET, HIT_U, HIT_V, HIT_Z, N_HIT = 3, 4, 5, 6, 7, 8
 
 # A film: its kind, its thickness or level [um], its medium, and the ground upside down
 Film = namedtuple("Film", "kind height medium flipped")
-# Transparent media, 0 the air: index and absorption [1/um] (wavelengths, media), and the
-# solid that a medium is instead, or -1. Solids, first the materials of the ground: index
-# (wavelengths, solids), strength of the diffuse base under each medium (wavelengths,
-# solids, media), and which are black
-Media = namedtuple("Media", "n absorption solid solid_n solid_kappa base black")
-World = namedtuple("World", "terrain film bodies media")
-
-
-@jit(forceinline=True)
-def medium_of(world, state, top):
-    """Medium the beam is in: of all that holds it, the one named first in the scene."""
-    medium = 0
-    for slot in range(int(state[top, N_INSIDE])):
-        number = state[top, INSIDE + 3 * slot]
-        other = world.film.medium
-        if number != FILM:
-            other = world.bodies.medium[int(number)]
-        if medium == 0 or other < medium:
-            medium = other
-    return medium
+# Media that light goes through, 0 the air: index and absorption [1/um] (wavelengths,
+# media), and the solid that a medium is instead, or -1. Solids, first the materials of the
+# ground: index (wavelengths, solids), which are black, and the diffuse base under each
+# medium (wavelengths, solids, media): its strength, and the share of samples of what a
+# medium takes in only because it absorbs
+Media = namedtuple("Media", "n kappa absorption solid solid_n solid_kappa black base tail")
+# `deep` is the optical depth from which on light is not followed, or inf
+World = namedtuple("World", "terrain film bodies media deep")
 
 
 @jit(forceinline=True)

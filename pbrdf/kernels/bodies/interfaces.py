@@ -106,8 +106,8 @@ def refract_beam(state, top, n_x, n_y, n_z, cos_in, ratio):
 
 
 @jit(forceinline=True)
-def scatter_about(state, top, n_x, n_y, n_z, draw_a, draw_b):
-    """Send the beam out as the cosine about a normal; returns the cosine of exit.
+def send_out(state, top, n_x, n_y, n_z, sine, cosine, draw):
+    """Send the beam out at an angle to a normal, at a random azimuth about it.
 
     Its frame is then that of the plane of exit, e_s along k x n.
     """
@@ -115,10 +115,8 @@ def scatter_about(state, top, n_x, n_y, n_z, draw_a, draw_b):
     sign = 1.0 if n_z >= 0.0 else -1.0
     share = -1.0 / (sign + n_z)
     mixed = n_x * n_y * share
-    sine = math.sqrt(draw_a)
-    cosine = max(math.sqrt(1.0 - draw_a), GRAZING)
-    a = sine * math.cos(TWO_PI * draw_b)
-    b = sine * math.sin(TWO_PI * draw_b)
+    a = sine * math.cos(TWO_PI * draw)
+    b = sine * math.sin(TWO_PI * draw)
     b1_x, b1_y, b1_z = 1.0 + sign * n_x * n_x * share, sign * mixed, -sign * n_x
     b2_x, b2_y, b2_z = mixed, sign + n_y * n_y * share, -n_y
     set_direction(
@@ -136,4 +134,3 @@ def scatter_about(state, top, n_x, n_y, n_z, draw_a, draw_b):
     state[top, SX] = s_x
     state[top, SY] = s_y
     state[top, SZ] = s_z
-    return cosine

@@ -8,25 +8,27 @@ strength and all elements of its matrix stay unbiased.
 import math
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.bodies.beams import CELL_I, CELL_J, EVENTS, MUELLER, copy_beam
-from pbrdf.kernels.bodies.events import (
-    BODY_IN,
-    GROUND,
-    HIT_BODY,
-    cross,
-    medium_of,
-    normal_at,
-    set_rate,
-)
+from pbrdf.kernels.bodies.beams import EVENTS, INDEX, MUELLER, copy_beam
+from pbrdf.kernels.bodies.events import cross, normal_at, set_rate
 from pbrdf.kernels.bodies.interfaces import (
     apply_elements,
     meet,
     reflect_beam,
     refract_beam,
     scale_columns,
-    scatter_about,
+    send_out,
 )
-from pbrdf.kernels.optics.fresnel import reflection_elements, transmission_elements
+from pbrdf.kernels.bodies.media import (
+    absorption_along,
+    both_elements,
+    index_along,
+    least_way,
+    leave_base,
+    medium_behind,
+    medium_of,
+    same_index,
+    solid_elements,
+)
 from pbrdf.kernels.paths.random import uniform_pair
 from pbrdf.kernels.paths.shading import ABSORBED
 
@@ -34,37 +36,50 @@ from pbrdf.kernels.paths.shading import ABSORBED
 # the second share goes on by chance only
 SPLIT = 0.01
 WEAK = 1e-3
+# Light this weak is below the rounding of what it would be added to, and is not followed
+GONE = 1e-16
 CROWDED = -9
 
 
 @jit(forceinline=True)
-def meet_interface(world, w, state, top, kind, hit, columns, stream, number, event):
-    """Reflect and refract at the surface of a transparent body; returns the new top.
+def meet_interface(
+    world, w, state, top, kind, hit, columns, stream, number, event, energy
+):  # fmt: skip
+    """Reflect and refract at the surface of a body or film; returns the new top.
 
     Within one medium nothing happens. CROWDED says that the beam is in too many bodies.
     """
     media = world.media
     before = medium_of(world, state, top)
-    copy_beam(state, top, top + 1)
-    if not cross(world, state, top + 1, kind, hit):
-        return CROWDED
-    after = medium_of(world, state, top + 1)
-    ratio = media.n[w, after] / media.n[w, before]
+    after = medium_behind(world, state, top, kind, hit)
     n_x, n_y, n_z = normal_at(world, state, top, kind, hit)
-    if before == after or ratio == 1.0:
-        copy_beam(state, top + 1, top)
+    if same_index(media, w, before, after):
+        if not cross(world, state, top, kind, hit):
+            return CROWDED
         set_rate(state, top, n_x, n_y, n_z)
         return top
 
     state[top, EVENTS] += 1.0
     cos_in = meet(state, top, columns, n_x, n_y, n_z)
-    a, b, c, d = reflection_elements(cos_in, ratio, 0.0)
-    a_t, b_t, c_t, d_t = 0.0, 0.0, 0.0, 0.0
-    if (ratio - 1.0) * (ratio + 1.0) + cos_in * cos_in > 0.0:
-        a_t, b_t, c_t, d_t = transmission_elements(cos_in, ratio, 0.0)
+    index = index_along(media, w, before, state, top)
+    a, b, c, d, a_t, b_t, c_t, d_t, ratio = both_elements(
+        media, w, before, after, index, cos_in
+    )
     i, q = state[top, MUELLER], state[top, MUELLER + 4]
     reflected = a * i + b * q
     refracted = a_t * i + b_t * q
+    if media.absorption[w, after] > 0.0:
+        copy_beam(state, top, top + 1)
+        refract_beam(state, top + 1, n_x, n_y, n_z, cos_in, ratio)
+        way = least_way(world, state, top + 1, kind, hit)
+        if way * absorption_along(media, w, after, ratio * index) >= world.deep:
+            ratio = 0.0
+    if ratio == 0.0:
+        # Nothing leaves the interface, or nothing that does will come out again
+        energy[w, ABSORBED] += refracted
+        refracted = 0.0
+    if reflected + refracted <= 0.0:
+        return top - 1
     both = min(reflected, refracted) >= SPLIT
     share = reflected / (reflected + refracted)
     keeps = False
@@ -74,9 +89,12 @@ def meet_interface(world, w, state, top, kind, hit, columns, stream, number, eve
     if both or not keeps:
         # The refracted part, on the far side
         further = top + 1 if both else top
-        copy_beam(state, top, further)
-        cross(world, state, further, kind, hit)
+        if both:
+            copy_beam(state, top, further)
+        if not cross(world, state, further, kind, hit):
+            return CROWDED
         refract_beam(state, further, n_x, n_y, n_z, cos_in, ratio)
+        state[further, INDEX] = ratio * index
         apply_elements(state, further, columns, a_t, b_t, c_t, d_t)
         if not both:
             scale_columns(state, further, columns, 1.0 / (1.0 - share))
@@ -91,10 +109,8 @@ def meet_interface(world, w, state, top, kind, hit, columns, stream, number, eve
 
 
 @jit(forceinline=True)
-def come_out(state, top, columns, cos_in, cos_out, n, kappa, base):
+def come_out(state, top, columns, a_in, b_in, a_out, b_out, base):
     """Take a beam through the interface to the diffuse base, and out again."""
-    a_in, b_in, _, _ = transmission_elements(cos_in, n, kappa)
-    a_out, b_out, _, _ = transmission_elements(cos_out, n, kappa)
     for column in range(columns):
         inside = base * (
             a_in * state[top, MUELLER + column] + b_in * state[top, MUELLER + 4 + column]
@@ -103,19 +119,6 @@ def come_out(state, top, columns, cos_in, cos_out, n, kappa, base):
         state[top, MUELLER + 4 + column] = b_out * inside
         state[top, MUELLER + 8 + column] = 0.0
         state[top, MUELLER + 12 + column] = 0.0
-
-
-@jit(forceinline=True)
-def solid_at(world, w, state, top, kind, hit):
-    """Solid that has just been met; -1 at the surface of something transparent."""
-    if kind == GROUND:
-        labels = world.terrain.labels
-        if labels.size == 0:
-            return 0
-        return int(labels[int(state[top, CELL_I]), int(state[top, CELL_J])])
-    if kind == BODY_IN:
-        return world.media.solid[w, world.bodies.medium[int(hit[HIT_BODY])]]
-    return -1
 
 
 @jit(forceinline=True)
@@ -132,18 +135,21 @@ def meet_solid(
     n_x, n_y, n_z = normal_at(world, state, top, kind, hit)
     state[top, EVENTS] += 1.0
     cos_in = meet(state, top, columns, n_x, n_y, n_z)
-    n = media.solid_n[w, solid] / media.n[w, medium]
-    kappa = media.solid_kappa[w, solid] / media.n[w, medium]
+    a, b, c, d, a_in, b_in = solid_elements(
+        media, w, solid, medium, index_along(media, w, medium, state, top), cos_in
+    )
     base = media.base[w, solid, medium]
     scattered = 0.0
     if base > 0.0:
         draw_a, draw_b = uniform_pair(stream, number, event)
         copy_beam(state, top, top + 1)
-        cos_out = scatter_about(state, top + 1, n_x, n_y, n_z, draw_a, draw_b)
-        come_out(state, top + 1, columns, cos_in, cos_out, n, kappa, base)
+        index, sine, cos_out, weight = leave_base(media, w, solid, medium, draw_a)
+        send_out(state, top + 1, n_x, n_y, n_z, sine, cos_out, draw_b)
+        state[top + 1, INDEX] = index
+        _, _, _, _, a_out, b_out = solid_elements(media, w, solid, medium, index, cos_out)
+        come_out(state, top + 1, columns, a_in, b_in, a_out, b_out, base * weight)
         set_rate(state, top + 1, n_x, n_y, n_z)
         scattered = state[top + 1, MUELLER]
-    a, b, c, d = reflection_elements(cos_in, n, kappa)
     apply_elements(state, top, columns, a, b, c, d)
     energy[w, ABSORBED] += arriving - state[top, MUELLER] - scattered
     if state[top, MUELLER] > 0.0:
@@ -157,13 +163,20 @@ def meet_solid(
 
 
 @jit(forceinline=True)
-def absorb_on_the_way(world, w, state, top, columns, distance, energy):
-    """Weaken the beam by the medium it has crossed, Beer and Lambert."""
-    absorption = world.media.absorption[w, medium_of(world, state, top)]
-    if absorption > 0.0:
-        arriving = state[top, MUELLER]
-        scale_columns(state, top, columns, math.exp(-absorption * distance))
-        energy[w, ABSORBED] += arriving - state[top, MUELLER]
+def arrives(world, w, state, top, columns, distance, energy):
+    """Weaken the beam by the medium it has crossed, Beer and Lambert; False: it is gone."""
+    media = world.media
+    medium = medium_of(world, state, top)
+    if media.absorption[w, medium] == 0.0:
+        return True
+    arriving = state[top, MUELLER]
+    absorption = absorption_along(media, w, medium, state[top, INDEX])
+    scale_columns(state, top, columns, math.exp(-absorption * distance))
+    if state[top, MUELLER] < GONE:
+        energy[w, ABSORBED] += arriving
+        return False
+    energy[w, ABSORBED] += arriving - state[top, MUELLER]
+    return True
 
 
 @jit(forceinline=True)

@@ -1,4 +1,4 @@
-"""Light among transparent bodies and films on an opaque height field.
+"""Light among bodies and films on an opaque height field.
 
 A beam goes from event to event: it enters or leaves a body or the film, or meets something
 opaque, and may come apart there (`pbrdf.kernels.bodies.splitting`). The part at the top of
@@ -11,6 +11,7 @@ from pbrdf.kernels.bodies.beams import (
     EVENTS,
     FACET,
     FREE,
+    INDEX,
     KX,
     KY,
     KZ,
@@ -37,12 +38,12 @@ from pbrdf.kernels.bodies.events import (
     next_event,
 )
 from pbrdf.kernels.bodies.interfaces import turn_columns
+from pbrdf.kernels.bodies.media import solid_at
 from pbrdf.kernels.bodies.splitting import (
     CROWDED,
-    absorb_on_the_way,
+    arrives,
     meet_interface,
     meet_solid,
-    solid_at,
     survives,
 )
 from pbrdf.kernels.paths.ray_bounce import exit_turn
@@ -123,6 +124,7 @@ def launch_beam(state, x, y, z, beam, columns):
     state[0, EVENTS] = 0.0
     state[0, LEFT] = NOTHING
     state[0, N_INSIDE] = 0.0
+    state[0, INDEX] = 1.0
     for element in range(16):
         state[0, MUELLER + element] = 0.0
     for row in range(columns):
@@ -136,8 +138,8 @@ def follow_beam(
 ):  # fmt: skip
     """Take the beam at the top of the stack to its next event; returns the new top."""
     state, hit = room.state, room.hit
-    if kind < OUT:
-        absorb_on_the_way(world, w, state, top, columns, hit[HIT_T], tally.energy)
+    if kind < OUT and not arrives(world, w, state, top, columns, hit[HIT_T], tally.energy):
+        return top - 1
     if kind >= OUT or state[top, EVENTS] >= max_events:
         end_beam(state, top, kind, columns, w, cos_phi, sin_phi, tally)
         return top - 1
@@ -151,8 +153,9 @@ def follow_beam(
         )  # fmt: skip
     else:
         new = meet_interface(
-            world, w, state, top, kind, hit, columns, stream, number, 2 * step
-        )
+            world, w, state, top, kind, hit, columns, stream, number, 2 * step,
+            tally.energy,
+        )  # fmt: skip
         if new == CROWDED:
             end_beam(state, top, ASTRAY, columns, w, cos_phi, sin_phi, tally)
             return top - 1
