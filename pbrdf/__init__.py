@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from pbrdf.scene.scene import Scene
     from pbrdf.simulation.run import simulate
     from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
+    from pbrdf.wave import WaveModel
 
 __all__ = [
     "AccuracyWarning",
@@ -33,6 +34,7 @@ __all__ = [
     "MicrofacetModel",
     "Scene",
     "Spheres",
+    "WaveModel",
     "compare_dew",
     "load_scene",
     "materials",
@@ -52,6 +54,7 @@ _HOME = {
     "MicrofacetModel": "pbrdf.analytic",
     "Scene": "pbrdf.scene.scene",
     "Spheres": "pbrdf.contaminants",
+    "WaveModel": "pbrdf.wave",
     "compare_dew": "pbrdf.dew",
     "load_scene": "pbrdf.scene.read",
     "observe": "pbrdf.observation.run",

@@ -1,0 +1,1 @@
+"""Kernels of wave optics: amplitudes of one scattering, sums over orders, their matrix."""

@@ -1,0 +1,169 @@
+"""Amplitudes with which a rough interface turns one plane wave into another.
+
+Lengths are in units of 1/k, so that lateral wave vectors are sines and normal ones cosines.
+Directions are those of propagation. Every kernel b of first-order theory is returned as
+B = b cos(theta_s) cos(theta_i), which stays finite at grazing: first order of the heights
+is an amplitude 2i B h(K) / cos(theta_s). Elements are ordered (ss, sp, ps, pp), out before
+in.
+"""
+
+import cmath
+from collections import namedtuple
+from math import sqrt
+
+from pbrdf.kernels import jit
+
+__all__ = [
+    "LEAST_COSINE",
+    "Medium",
+    "Ray",
+    "curvature_change",
+    "first_order",
+    "lateral_ray",
+    "tangent_plane",
+]
+
+# Lateral wave vector as its length and azimuth, and the normal component: sin, cos of the
+# zenith, cos and sin of the azimuth of propagation
+Ray = namedtuple("Ray", "sin cos along across")
+
+# eps = N^2, and whether it is the perfect conductor (eps is not read then)
+Medium = namedtuple("Medium", "eps perfect")
+
+# Least cosine of a ray: on the horizon itself some ratios would be 0/0
+LEAST_COSINE = 1e-9
+
+# Below this sin^2 of twice the local incidence its plane has no direction
+PLANELESS = 1e-22
+
+
+@jit
+def lateral_ray(x, y):
+    """Ray of a lateral wave vector; behind the horizon it is laid on it."""
+    length = sqrt(x * x + y * y)
+    if length == 0.0:
+        return Ray(0.0, 1.0, 1.0, 0.0)
+    lateral = min(length, 1.0)
+    cosine = max(sqrt((1.0 - lateral) * (1.0 + lateral)), LEAST_COSINE)
+    return Ray(lateral, cosine, x / length, y / length)
+
+
+@jit(forceinline=True)
+def turn_between(ray_in, ray_out):
+    """Cosine and sine of the azimuth from one ray to another."""
+    return (
+        ray_out.along * ray_in.along + ray_out.across * ray_in.across,
+        ray_out.across * ray_in.along - ray_out.along * ray_in.across,
+    )
+
+
+@jit(forceinline=True)
+def normal_inside(ray, medium):
+    """Return the normal component behind the interface, sqrt(eps - sin^2)."""
+    return cmath.sqrt(medium.eps - 1.0 + ray.cos * ray.cos)
+
+
+@jit
+def first_order(ray_in, ray_out, medium):
+    """Small-perturbation kernel of Rice in all four elements, times both cosines.
+
+    S. O. Rice, Commun. Pure Appl. Math. 4, 351 (1951); J. M. Elson and J. M. Bennett, Opt.
+    Eng. 18, 116 (1979). At equal lateral vectors it is minus Fresnel's amplitude.
+    """
+    turn, side = turn_between(ray_in, ray_out)
+    cos_s, cos_i = ray_out.cos, ray_in.cos
+    if medium.perfect:
+        return (
+            complex(turn * cos_s * cos_i, 0.0),
+            complex(-side * cos_s, 0.0),
+            complex(-side * cos_i, 0.0),
+            complex(ray_out.sin * ray_in.sin - turn, 0.0),
+        )
+    eps = medium.eps
+    in_s, in_i = normal_inside(ray_out, medium), normal_inside(ray_in, medium)
+    # Waves that an s or p field drives, out and in
+    out_s, out_p = cos_s / (cos_s + in_s), cos_s / (eps * cos_s + in_s)
+    into_s, into_p = cos_i / (cos_i + in_i), cos_i / (eps * cos_i + in_i)
+    excess = eps - 1.0
+    return (
+        excess * turn * out_s * into_s,
+        -excess * side * in_i * out_s * into_p,
+        -excess * side * in_s * out_p * into_s,
+        excess * (eps * ray_out.sin * ray_in.sin - in_s * in_i * turn) * out_p * into_p,
+    )
+
+
+@jit
+def tangent_plane(ray_in, ray_out, medium):
+    """Kirchhoff kernel with Fresnel at the facet that mirrors, times both cosines.
+
+    -(Q/2k)^2 R_out diag(r_s, r_p) R_in; Q/2k is the cosine of the local incidence.
+    """
+    turn, side = turn_between(ray_in, ray_out)
+    cos_i, sin_i, cos_s, sin_s = ray_in.cos, ray_in.sin, ray_out.cos, ray_out.sin
+    cos2 = 0.5 * (1.0 + cos_i * cos_s - sin_i * sin_s * turn)
+    sin2 = 0.5 * (1.0 - cos_i * cos_s + sin_i * sin_s * turn)
+    r_s, r_p = facet_amplitudes(sqrt(max(cos2, 0.0)), sin2, medium)
+
+    # Frame vectors of each ray seen from the other ray
+    out_s, out_p = -sin_i * side, -(cos_s * sin_i * turn + sin_s * cos_i)
+    in_s, in_p = sin_s * side, cos_i * sin_s * turn + sin_i * cos_s
+    plane = out_s * out_s + out_p * out_p
+    if plane < PLANELESS:
+        # Straight back: the field keeps its direction and takes r_s
+        scale = -cos2 * r_s
+        return (
+            scale * turn,
+            -scale * side * cos_i,
+            -scale * side * cos_s,
+            scale * (sin_s * sin_i - cos_s * cos_i * turn),
+        )
+    scale = -cos2 / plane
+    return (
+        -scale * (out_p * in_p * r_s + out_s * in_s * r_p),
+        scale * (out_p * in_s * r_s - out_s * in_p * r_p),
+        scale * (out_s * in_p * r_s - out_p * in_s * r_p),
+        -scale * (out_s * in_s * r_s + out_p * in_p * r_p),
+    )
+
+
+@jit(forceinline=True)
+def facet_amplitudes(cos_beta, sin2_beta, medium):
+    """Fresnel's r_s, r_p in the forms in which nothing cancels."""
+    if medium.perfect:
+        return complex(-1.0, 0.0), complex(1.0, 0.0)
+    inside = cmath.sqrt(medium.eps - 1.0 + cos_beta * cos_beta)
+    forward = cos_beta + inside
+    if forward == 0.0:
+        return complex(0.0, 0.0), complex(0.0, 0.0)
+    r_s = (1.0 - medium.eps) / (forward * forward)
+    r_p = r_s * (sin2_beta - inside * cos_beta) / (sin2_beta + inside * cos_beta)
+    return r_s, r_p
+
+
+@jit
+def curvature_change(ray_in, ray_out, shift_x, shift_y, medium):
+    """First-order less tangent-plane kernel where the surface adds a wave vector `shift`.
+
+    Taken at the mean of the two lateral vectors, plus and minus half the shift, and turned
+    into the frames of the rays given.
+    """
+    middle_x = 0.5 * (ray_out.sin * ray_out.along + ray_in.sin * ray_in.along)
+    middle_y = 0.5 * (ray_out.sin * ray_out.across + ray_in.sin * ray_in.across)
+    to = lateral_ray(middle_x + 0.5 * shift_x, middle_y + 0.5 * shift_y)
+    come = lateral_ray(middle_x - 0.5 * shift_x, middle_y - 0.5 * shift_y)
+    rice, plane = first_order(come, to, medium), tangent_plane(come, to, medium)
+    ss, sp, ps, pp = (
+        rice[0] - plane[0],
+        rice[1] - plane[1],
+        rice[2] - plane[2],
+        rice[3] - plane[3],
+    )
+    # Outgoing frame, then incoming
+    cos_o, sin_o = turn_between(ray_out, to)
+    ss, ps = ss * cos_o - ps * sin_o, ss * sin_o + ps * cos_o
+    sp, pp = sp * cos_o - pp * sin_o, sp * sin_o + pp * cos_o
+    cos_n, sin_n = turn_between(ray_in, come)
+    ss, sp = ss * cos_n + sp * sin_n, sp * cos_n - ss * sin_n
+    ps, pp = ps * cos_n + pp * sin_n, pp * cos_n - ps * sin_n
+    return ss, sp, ps, pp

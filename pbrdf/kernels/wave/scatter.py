@@ -1,0 +1,294 @@
+"""Mueller matrix of single scattering by a rough interface, from amplitudes and moments.
+
+The scattered field of order n has the Jones matrix B_n; its matrix is the mean of B_n B_n^+
+over the orders, built as a sum of Jones matrices with positive weights: it is realisable
+whatever the numbers.
+"""
+
+from collections import namedtuple
+from math import sqrt
+
+import numpy as np
+
+from pbrdf.kernels import jit
+from pbrdf.kernels.optics.elementary import erf, exp
+from pbrdf.kernels.wave.amplitudes import (
+    LEAST_COSINE,
+    Medium,
+    Ray,
+    curvature_change,
+    first_order,
+    tangent_plane,
+)
+
+__all__ = [
+    "CURVATURE",
+    "HORIZON",
+    "ORDER_WEIGHTED",
+    "RICE",
+    "TANGENT",
+    "Plan",
+    "fill_scattering",
+    "shadowing",
+]
+
+# Which amplitude an order has: first-order, tangent-plane, the weighted mean, or that with
+# the mean and the scatter of the local curvature
+RICE, TANGENT, ORDER_WEIGHTED, CURVATURE = range(4)
+
+# kernel: one of the above; dimensions: 1 for a profile; shadowed: apply Smith's factor
+Plan = namedtuple("Plan", "kernel dimensions shadowed")
+
+# g = q^2 h^2, rms wave vector of the heights per axis over k, rms slope
+Surface = namedtuple("Surface", "g spread slope")
+
+# Local wave vectors reach this share of the horizon, unless a ray given lies beyond
+HORIZON = 0.97
+
+SQRT_2, SQRT_PI = sqrt(2.0), sqrt(np.pi)
+SQRT_3 = sqrt(3.0)
+# Nodes and weights of a unit Gaussian: three points on a line, a hexagon in the plane; the
+# rest of the weight is at zero, where nothing changes
+LINE_WEIGHT, HEXAGON_WEIGHT = 1.0 / 6.0, 1.0 / 12.0
+HEXAGON = ((2.0, 0.0), (1.0, SQRT_3), (-1.0, SQRT_3))
+
+
+@jit(forceinline=True)
+def added(sums, weight, jones):
+    """Return sums of the products of Jones elements with those of one more matrix."""
+    ss, sp, ps, pp = jones
+    return (
+        sums[0] + weight * (ss.real * ss.real + ss.imag * ss.imag),
+        sums[1] + weight * (sp.real * sp.real + sp.imag * sp.imag),
+        sums[2] + weight * (ps.real * ps.real + ps.imag * ps.imag),
+        sums[3] + weight * (pp.real * pp.real + pp.imag * pp.imag),
+        sums[4] + weight * ss * sp.conjugate(),
+        sums[5] + weight * ps * pp.conjugate(),
+        sums[6] + weight * ss * ps.conjugate(),
+        sums[7] + weight * sp * pp.conjugate(),
+        sums[8] + weight * ss * pp.conjugate(),
+        sums[9] + weight * sp * ps.conjugate(),
+    )
+
+
+@jit(forceinline=True)
+def combined(a, jones_a, b, jones_b, c, jones_c):
+    """Linear combination of three Jones matrices."""
+    return (
+        a * jones_a[0] + b * jones_b[0] + c * jones_c[0],
+        a * jones_a[1] + b * jones_b[1] + c * jones_c[1],
+        a * jones_a[2] + b * jones_b[2] + c * jones_c[2],
+        a * jones_a[3] + b * jones_b[3] + c * jones_c[3],
+    )
+
+
+@jit(forceinline=True)
+def nothing():
+    """Begin sums with no matrix at all."""
+    zero = complex(0.0, 0.0)
+    return 0.0, 0.0, 0.0, 0.0, zero, zero, zero, zero, zero, zero
+
+
+@jit
+def over_orders(sums, plain, per_order, mean, moments):
+    """Add the mean square of plain + per_order/n + n mean over the orders.
+
+    The moments of (1, n, 1/n) are a Gram matrix; its Cholesky factor turns the mean into
+    three matrices.
+    """
+    rising, first, total, falling, steep = moments
+    if total <= 0.0:
+        return sums
+    root = sqrt(total)
+    b, c = first / root, falling / root
+    spread_b = sqrt(max(rising - b * b, 0.0))
+    coupling = (total - b * c) / spread_b if spread_b > 1e-7 * sqrt(rising) else 0.0
+    spread_c = sqrt(max(steep - c * c - coupling * coupling, 0.0))
+    sums = added(sums, 1.0, combined(root, plain, b, mean, c, per_order))
+    sums = added(sums, 1.0, combined(0.0, plain, spread_b, mean, coupling, per_order))
+    return added(sums, 1.0, combined(0.0, plain, 0.0, mean, spread_c, per_order))
+
+
+@jit(forceinline=True)
+def reach_of_shift(ray_in, ray_out, x, y):
+    """Share of a shift at which one of the two waves would reach the horizon."""
+    middle_x = 0.5 * (ray_out.sin * ray_out.along + ray_in.sin * ray_in.along)
+    middle_y = 0.5 * (ray_out.sin * ray_out.across + ray_in.sin * ray_in.across)
+    rim = max(HORIZON, max(ray_in.sin, ray_out.sin))
+    square = 0.25 * (x * x + y * y)
+    along = 0.5 * abs(middle_x * x + middle_y * y)
+    room = rim * rim - middle_x * middle_x - middle_y * middle_y
+    # square t^2 + 2 along t = room, the worse sign of the two
+    root = room / (along + sqrt(along * along + square * room) + 1e-300)
+    return min(root, 1.0)
+
+
+@jit
+def node(plan, k, spread, ray_in, ray_out):
+    """Wave vector of node k of the spectrum, bounded by the horizon."""
+    if plan.dimensions == 1:
+        x, y = SQRT_3 * spread, 0.0
+    else:
+        # Along the mean of the two rays: exchanging them leaves the hexagon as it is
+        mx = ray_out.sin * ray_out.along + ray_in.sin * ray_in.along
+        my = ray_out.sin * ray_out.across + ray_in.sin * ray_in.across
+        length = sqrt(mx * mx + my * my)
+        cos_m, sin_m = (mx / length, my / length) if length > 1e-9 else (1.0, 0.0)
+        u, v = HEXAGON[k]
+        x, y = spread * (cos_m * u - sin_m * v), spread * (sin_m * u + cos_m * v)
+    share = reach_of_shift(ray_in, ray_out, x, y)
+    return share * x, share * y
+
+
+@jit
+def with_curvature(ray_in, ray_out, medium, plan, surface, moments, changes):
+    """Sum the order-weighted amplitude with the mean and scatter of the curvature.
+
+    Order n is diffracted n times, by wave vectors xi_i that add up to K. With the change
+    d(xi) of the kernel, the amplitude is b_KA + sum d(xi_i) less what the heights contract
+    with themselves. For a Gaussian spectrum and quadratic d its mean is
+    b_KA + d(K)/n + (n - 1 - g) <d> and its variance (n - 1) var d.
+    """
+    plane = tangent_plane(ray_in, ray_out, medium)
+    rice = first_order(ray_in, ray_out, medium)
+    line = plan.dimensions == 1
+    pairs, weight = (1, LINE_WEIGHT) if line else (3, HEXAGON_WEIGHT)
+    mean = combined(0.0, plane, 0.0, plane, 0.0, plane)
+    for k in range(pairs):
+        x, y = node(plan, k, surface.spread, ray_in, ray_out)
+        for way in range(2):
+            sign = 1.0 - 2.0 * way
+            there = curvature_change(ray_in, ray_out, sign * x, sign * y, medium)
+            for element in range(4):
+                changes[2 * k + way, element] = there[element]
+            mean = combined(1.0, mean, weight, there, 0.0, there)
+    # Scatter about the mean; the node at zero has d = 0
+    scatter = max(moments[1] - moments[2], 0.0)
+    sums = added(nothing(), scatter * (1.0 - 2 * pairs * weight), mean)
+    for k in range(2 * pairs):
+        there = (changes[k, 0], changes[k, 1], changes[k, 2], changes[k, 3])
+        sums = added(sums, scatter * weight, combined(1.0, there, -1.0, mean, 0.0, mean))
+    change = combined(1.0, rice, -1.0, plane, 0.0, plane)
+    plain = combined(1.0, plane, -(1.0 + surface.g), mean, 0.0, mean)
+    return over_orders(sums, plain, change, mean, moments)
+
+
+@jit
+def scattered_sums(ray_in, ray_out, medium, plan, surface, moments, changes):
+    """Products of Jones elements of the scattered light, by the plan's amplitude."""
+    if plan.kernel == CURVATURE:
+        return with_curvature(ray_in, ray_out, medium, plan, surface, moments, changes)
+    if plan.kernel == RICE:
+        return added(nothing(), moments[2], first_order(ray_in, ray_out, medium))
+    plane = tangent_plane(ray_in, ray_out, medium)
+    if plan.kernel == TANGENT:
+        return added(nothing(), moments[2], plane)
+    rice = first_order(ray_in, ray_out, medium)
+    change = combined(1.0, rice, -1.0, plane, 0.0, plane)
+    no_mean = combined(0.0, plane, 0.0, plane, 0.0, plane)
+    return over_orders(nothing(), plane, change, no_mean, moments)
+
+
+@jit(forceinline=True)
+def overhang(cos_theta, sin_theta, slope):
+    """Smith's Lambda of Gaussian slopes."""
+    nu = min(cos_theta / (SQRT_2 * slope * sin_theta + 1e-300), 25.0)
+    nu = max(nu, 1e-12)
+    return max(0.5 * (exp(-nu * nu) / (nu * SQRT_PI) + erf(nu) - 1.0), 0.0)
+
+
+@jit(forceinline=True)
+def shadowing(ray_in, ray_out, slope):
+    """Smith's factor; hidings fully dependent at one azimuth, independent at the opposite.
+
+    Between them the weight of van Ginneken et al., Appl. Opt. 37, 130 (1998).
+    """
+    turn, side = turn_of(ray_in, ray_out)
+    azimuth = np.pi - np.arctan2(abs(side), turn)
+    weight = azimuth * (1.0 + 4.41 * np.pi) / (np.pi * (1.0 + 4.41 * azimuth))
+    one = overhang(ray_in.cos, ray_in.sin, slope)
+    other = overhang(ray_out.cos, ray_out.sin, slope)
+    return 1.0 / (1.0 + max(one, other) + weight * min(one, other))
+
+
+@jit(forceinline=True)
+def turn_of(ray_in, ray_out):
+    """Cosine and sine of the azimuth between the rays."""
+    return (
+        ray_out.along * ray_in.along + ray_out.across * ray_in.across,
+        ray_out.across * ray_in.along - ray_out.along * ray_in.across,
+    )
+
+
+@jit(forceinline=True)
+def write_matrix(sums, factor, retard_in, retard_out, out):
+    """Write the Mueller matrix of the sums, between two retarders of s against p."""
+    ss, sp, ps, pp, ss_sp, ps_pp, ss_ps, sp_pp, ss_pp, sp_ps = sums
+    into = complex(np.cos(retard_in), np.sin(retard_in))
+    away = complex(np.cos(retard_out), np.sin(retard_out))
+    ss_sp, ps_pp = ss_sp * into, ps_pp * into
+    ss_ps, sp_pp = ss_ps * away, sp_pp * away
+    ss_pp, sp_ps = ss_pp * into * away, sp_ps * away * into.conjugate()
+    half = 0.5 * factor
+    out[0] = half * (ss + sp + ps + pp)
+    out[1] = half * (ss - sp + ps - pp)
+    out[2] = factor * (ss_sp + ps_pp).real
+    out[3] = -factor * (ss_sp + ps_pp).imag
+    out[4] = half * (ss + sp - ps - pp)
+    out[5] = half * (ss - sp - ps + pp)
+    out[6] = factor * (ss_sp - ps_pp).real
+    out[7] = -factor * (ss_sp - ps_pp).imag
+    out[8] = factor * (ss_ps + sp_pp).real
+    out[9] = factor * (ss_ps - sp_pp).real
+    out[10] = factor * (ss_pp + sp_ps).real
+    out[11] = factor * (sp_ps - ss_pp).imag
+    out[12] = factor * (ss_ps + sp_pp).imag
+    out[13] = factor * (ss_ps - sp_pp).imag
+    out[14] = factor * (ss_pp + sp_ps).imag
+    out[15] = factor * (ss_pp - sp_ps).real
+
+
+@jit
+def fill_scattering(angles, indices, statistics, moments, retardance, plan, out):
+    """Fill the rows of `out` with Mueller matrices, 16 elements each.
+
+    Parameters
+    ----------
+    angles : (3, N)
+        theta_i, theta_s, dphi of the conventions page.
+    indices : (2, N)
+        n and kappa; n = inf is a perfect conductor.
+    statistics : (3, N)
+        k h; rms wave vector of the heights per axis over k; rms slope.
+    moments : (5, N)
+        Of n^2, n, 1, 1/n, 1/n^2.
+    retardance : (2, N)
+        Phase of s over p that the mean field takes on its way in and out.
+    out : (N, 16)
+        1/sr; of a profile, power per radian over incident power.
+    """
+    changes = np.empty((6, 4), dtype=np.complex128)
+    for k in range(out.shape[0]):
+        cos_i = max(np.cos(angles[0, k]), LEAST_COSINE)
+        cos_s = max(np.cos(angles[1, k]), LEAST_COSINE)
+        # Propagation turns by dphi - pi
+        ray_in = Ray(np.sin(angles[0, k]), cos_i, 1.0, 0.0)
+        turn, side = -np.cos(angles[2, k]), -np.sin(angles[2, k])
+        ray_out = Ray(np.sin(angles[1, k]), cos_s, turn, side)
+        perfect = indices[0, k] == np.inf
+        index = complex(1.0 if perfect else indices[0, k], indices[1, k])
+        medium = Medium(index * index, perfect)
+        rise = cos_i + cos_s
+        height = statistics[0, k] * rise
+        surface = Surface(height * height, statistics[1, k], statistics[2, k])
+        five = (moments[0, k], moments[1, k], moments[2, k], moments[3, k], moments[4, k])
+        sums = scattered_sums(ray_in, ray_out, medium, plan, surface, five, changes)
+        factor = 1.0 / (np.pi * np.pi * cos_i * cos_s * rise * rise)
+        if plan.dimensions == 1:
+            factor = 2.0 / (np.pi * cos_i * rise * rise)
+        if plan.shadowed:
+            factor *= shadowing(ray_in, ray_out, surface.slope)
+        # Of an order n of scattering one step in n is the mean field's; as an amplitude
+        share = sqrt(five[3] / five[2]) if five[2] > 0.0 else 0.0
+        into, away = share * retardance[0, k], share * retardance[1, k]
+        write_matrix(sums, factor, into, away, out[k])

@@ -1,0 +1,6 @@
+"""Wave optics of random surfaces, from polished to as rough as rays can take."""
+
+from pbrdf.wave.methods import METHODS
+from pbrdf.wave.model import WaveModel
+
+__all__ = ["METHODS", "WaveModel"]

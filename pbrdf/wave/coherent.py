@@ -1,0 +1,188 @@
+"""Mean field of the specular beam to second order in the heights, summed to all heights.
+
+Reduced Rayleigh equations of a surface that light enters or not, in two dimensions with
+both polarisations (G. Brown, V. Celli, M. Haller, A. Marvin, Surf. Sci. 136, 381 (1984);
+A. Soubret, G. Berginc, C. Bourrely, Phys. Rev. B 63, 245411 (2001)); a profile is the same
+with waves in one plane. Lengths are in units of 1/k.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbrdf.wave.statistics import panels
+
+__all__ = ["MeanField", "Medium", "mean_field"]
+
+Array = np.ndarray
+
+# Widths of the spectrum, in units of 1/l, at which panels of the integral begin
+WIDTHS = np.array([0.0, 1.5, 4.0, 8.0, 13.0])
+# Evanescent waves beyond this lateral wave vector are left out where a spectrum falls by a
+# power law: its integral over finer and finer roughness has no end
+FARTHEST_WAVE = 3.0
+
+
+@dataclass(frozen=True)
+class Medium:
+    """What is below the surface: eps = (n + i kappa)^2, or a perfect conductor."""
+
+    eps: complex
+    perfect: bool = False
+
+    @classmethod
+    def of(cls, n: float, kappa: float) -> "Medium":
+        """Medium of an index; n = inf is the perfect conductor."""
+        return cls(1.0 + 0j, True) if np.isinf(n) else cls(complex(n, kappa) ** 2)
+
+
+@dataclass(frozen=True)
+class MeanField:
+    """Flat amplitudes (s, p), their second-order change, and 2 (k h cos theta)^2."""
+
+    flat: Array
+    second: Array
+    exponent: float
+    perfect: bool
+
+    @property
+    def amplitudes(self) -> Array:
+        """Reflection amplitudes r_s, r_p of the mean field at any height.
+
+        exp(-g) (r (1 + g) + second), which stays finite where r vanishes; for p on a
+        perfect conductor, where it does not, the exponential of the second order. Each is
+        the better of the two on rigorous profiles.
+        """
+        g = self.exponent
+        amplitudes = np.exp(-g) * (self.flat * (1.0 + g) + self.second)
+        if self.perfect:
+            amplitudes[1] = self.flat[1] * np.exp(self.second[1] / self.flat[1])
+        return amplitudes
+
+    @property
+    def retardance(self) -> float:
+        """Half the phase of s over p that the heights add, times the reflectance."""
+        phase = (self.second * self.flat.conj()).imag
+        return float(0.5 * (phase[0] - phase[1]))
+
+
+def mean_field(
+    sine: float,
+    medium: Medium,
+    height: float,
+    length: float,
+    spectrum: Callable[[Array], Array],
+    *,
+    dimensions: int,
+    bounded: bool,
+) -> MeanField:
+    """Mean field of one incidence.
+
+    Parameters
+    ----------
+    sine : float
+        Sine of the incidence. [1]
+    medium : Medium
+        What is below.
+    height, length : float
+        k h and k l.
+    spectrum : callable
+        W of the heights at lateral wave vectors K/k.
+    dimensions : int
+        1 for a profile, 2 for an isotropic surface.
+    bounded : bool
+        Whether the spectrum falls fast enough to need no end.
+    """
+    wave, turn, weight = _waves(sine, length, dimensions, bounded)
+    step = np.sqrt(np.maximum(wave**2 + sine**2 - 2 * wave * sine * turn, 0.0))
+    weight = weight * spectrum(step) / (2 * np.pi) ** dimensions
+    cosine = np.sqrt((1.0 - sine) * (1.0 + sine))
+    g = 2.0 * (height * cosine) ** 2
+    solve = _conductor if medium.perfect else _penetrable
+    flat, second = solve(sine, cosine, medium.eps, wave, turn, weight, height)
+    return MeanField(flat, second, g, medium.perfect)
+
+
+def _waves(
+    sine: float, length: float, dimensions: int, bounded: bool
+) -> tuple[Array, Array, Array]:
+    """Lateral wave vectors, cosines of their azimuth, and weights of the quadrature.
+
+    Zenith angles of propagating waves and hyperbolic angles of evanescent ones take away
+    the square root at the horizon.
+    """
+    widths = WIDTHS / length
+    far = sine + widths[-1]
+    far = max(far, 1.0) if bounded else FARTHEST_WAVE
+    cuts = np.clip(np.r_[sine - widths, sine + widths, 0.0, 1.0], 0.0, far)
+    cuts = np.unique(np.r_[cuts, far])
+    zenith, step = panels(np.arcsin(cuts[cuts <= 1.0]))
+    wave, weight = [np.sin(zenith)], [step * np.cos(zenith)]
+    beyond = cuts[cuts >= 1.0]
+    if beyond.size > 1:
+        steep, step = panels(np.arccosh(beyond))
+        wave.append(np.cosh(steep))
+        weight.append(step * np.sinh(steep))
+    waves, weights = np.concatenate(wave), np.concatenate(weight)
+    if dimensions == 1:
+        sides = np.repeat([1.0, -1.0], waves.size)
+        return np.tile(waves, 2), sides, np.tile(weights, 2)
+    # Azimuths from that of the incident wave, as narrow as the spectrum seen from there
+    span = np.minimum(widths[1:] / max(sine, 1e-9), np.pi)
+    azimuth, step = panels(np.unique(np.r_[0.0, span, np.pi]))
+    grid = np.broadcast_to(waves[:, None], (waves.size, azimuth.size))
+    turns = np.broadcast_to(np.cos(azimuth), grid.shape)
+    both = 2.0 * (weights * waves)[:, None] * step
+    return grid.ravel(), turns.ravel(), both.ravel()
+
+
+def _conductor(
+    sine: float, cosine: float, _eps: complex, wave: Array, turn: Array, weight: Array,
+    _height: float,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Second order of a perfect conductor: two first-order steps through every wave."""
+    normal = np.sqrt(1.0 - wave**2 + 0j)
+    side2 = 1.0 - turn**2
+    through_s = turn**2 * normal * weight
+    cross = side2 * weight / normal
+    through_p = (wave * sine - turn) ** 2 * weight / normal
+    second_s = 2.0 * cosine * (through_s + cross).sum()
+    second_p = -2.0 / cosine * (side2 * normal * weight + through_p).sum()
+    return np.array([-1.0, 1.0], dtype=complex), np.array([second_s, second_p])
+
+
+def _penetrable(
+    sine: float, cosine: float, eps: complex, wave: Array, turn: Array, weight: Array,
+    height: float,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Second order of a medium with finite eps from the reduced Rayleigh equations.
+
+    M+-(u|p) = [[c, -+ b x], [a x, u p +- a b c]] in (s, p), with c, x the cosine and sine
+    from u to p, b the normal component of p outside and a that of u inside.
+    """
+    outside, inside = np.sqrt(1.0 - wave**2 + 0j), np.sqrt(eps - wave**2)
+    b, a = complex(cosine), np.sqrt(eps - sine**2)
+    flat = np.array([(b - a) / (b + a), (eps * b - a) / (eps * b + a)])
+    r_s, r_p = flat
+    side2 = 1.0 - turn**2
+
+    # First order into every wave from s (with side = x) and from p: i (a - b) M+^-1 (...)
+    gap = 1j * (inside - outside)
+    norm_p = wave**2 + inside * outside
+    s_to_s = gap * turn * (1.0 + r_s)
+    s_to_p = gap * inside * (1.0 + r_s) / norm_p
+    p_to_s = gap * b * (1.0 - r_p)
+    up, down = wave * sine + inside * b * turn, wave * sine - inside * b * turn
+    p_to_p = gap * (down + up * r_p) / norm_p
+
+    # Back into the specular beam; the sine of the azimuth changes sign on the way back
+    back_s = turn * s_to_s + outside * side2 * s_to_p
+    back_p = -a * side2 * p_to_s + (wave * sine + a * outside * turn) * p_to_p
+    norm_s, norm_p0 = 1.0, sine**2 + a * b
+    half = 0.5 * height**2
+    direct_s = half * ((a + b) + (a - b) * r_s)
+    direct_p = half * ((a + b) * (sine**2 - a * b) + (a - b) * norm_p0 * r_p)
+    second_s = (a - b) / norm_s * (direct_s + 1j * (weight * back_s).sum())
+    second_p = (a - b) / norm_p0 * (direct_p + 1j * (weight * back_p).sum())
+    return flat, np.array([second_s, second_p])

@@ -1,0 +1,262 @@
+"""Polarised reflectance of a surface whose roughness is no larger than the wavelength."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pbrdf.analytic.geometry import checked_zenith, flat_geometry
+from pbrdf.errors import require
+from pbrdf.optics import library
+from pbrdf.optics.materials import Material
+from pbrdf.wave.local_curvature import profile_curvature
+from pbrdf.wave.methods import method_of
+from pbrdf.wave.scattering import Scattering
+from pbrdf.wave.statistics import Statistics
+from pbrdf.wave.surfaces import heights_of
+
+__all__ = ["WaveModel"]
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class WaveModel:
+    """Scattering and mean reflection of a Gaussian-height surface by wave optics.
+
+    Parameters
+    ----------
+    material : Material or str
+        What is below the surface, or the name of a material of the library.
+    height_rms, corr_length : float
+        Rms height and 1/e length of the autocorrelation. [um]
+    autocorrelation : str, callable or (lag, correlation)
+        "gaussian", "exponential", "k-correlation" (with `exponent`), a function of the lag
+        [um] that is 1 at zero, or a table; corr_length then follows from it.
+    psd : (frequency, density), optional
+        Measured two-sided spectral density over frequencies without 2 pi [1/um];
+        height_rms and corr_length follow from it. `brdf` and `coherent` read it as that of
+        the isotropic surface, whose integral over the plane of frequencies is height_rms^2
+        [um^4]; `profile_scattering` and `profile_coherent` as that of the profile [um^3].
+    method : str
+        A key of `pbrdf.wave.METHODS`.
+    exponent : float, optional
+        Of "k-correlation": the density of profiles falls by this power. [1]
+
+    Raises
+    ------
+    ValueError
+        If a value leaves its range or a name is unknown.
+
+    Notes
+    -----
+    Single scattering. Where the rms slope exceeds 0.45 a call warns: double bounces are
+    missing.
+
+    References
+    ----------
+    .. [1] S. O. Rice, Commun. Pure Appl. Math. 4, 351 (1951).
+    .. [2] P. Beckmann, A. Spizzichino, The Scattering of Electromagnetic Waves from Rough
+       Surfaces, 1963.
+    .. [3] T. M. Elfouhaily, C.-A. Guerin, Waves in Random Media 14, R1 (2004).
+
+    Examples
+    --------
+    A polished glass scatters little, and its specular beam keeps almost all of 4 %:
+
+    >>> polished = WaveModel(Material(1.5), height_rms=0.005, corr_length=2.0)
+    >>> float(polished.coherent(0.0, 0.633)[0, 0].round(4))
+    0.0396
+    >>> float(polished.brdf(0.0, 0.2, 0.0, 0.633)[0, 0].round(5))
+    0.00025
+    """
+
+    material: Material
+    height_rms: float | None
+    corr_length: float | None
+    autocorrelation: Any
+    psd: Any
+    method: str
+    exponent: float | None
+
+    def __init__(
+        self,
+        material: Material | str,
+        *,
+        height_rms: float | None = None,
+        corr_length: float | None = None,
+        autocorrelation: Any = "gaussian",
+        psd: Any = None,
+        method: str = "auto",
+        exponent: float | None = None,
+    ) -> None:
+        set_field = object.__setattr__
+        known = isinstance(material, Material)
+        set_field(self, "material", material if known else library.get(str(material)))
+        set_field(self, "height_rms", height_rms)
+        set_field(self, "corr_length", corr_length)
+        set_field(self, "autocorrelation", autocorrelation)
+        set_field(self, "psd", psd)
+        set_field(self, "method", method)
+        set_field(self, "exponent", exponent)
+        # A fault of the surface shows here, not at the first call
+        method_of(method)
+        _ = self.surface
+
+    @cached_property
+    def surface(self) -> Scattering:
+        """The heights as those of an isotropic surface."""
+        return Scattering(self._heights(2), self.method, 2)
+
+    @cached_property
+    def profile(self) -> Scattering:
+        """The heights as those of a profile."""
+        heights = self.surface.heights if self.psd is None else self._heights(1)
+        return Scattering(heights, self.method, 1)
+
+    def _heights(self, dimensions: int) -> Statistics:
+        """Statistics of the heights along one axis or two."""
+        return heights_of(
+            self.autocorrelation, self.psd, self.height_rms, self.corr_length,
+            self.exponent, dimensions,
+        )  # fmt: skip
+
+    def brdf(
+        self,
+        theta_i: npt.ArrayLike,
+        theta_s: npt.ArrayLike,
+        dphi: npt.ArrayLike,
+        wavelength: npt.ArrayLike,
+    ) -> Array:
+        """Mueller BRDF of the incoherent part, without the specular beam.
+
+        Parameters
+        ----------
+        theta_i, theta_s : array_like
+            Zeniths of the directions to source and detector, in [0, pi/2]. [rad]
+        dphi : array_like
+            phi_s - phi_i; specular at pi. [rad]
+        wavelength : array_like
+            Vacuum wavelength. [um]
+
+        Returns
+        -------
+        ndarray, shape (..., 4, 4)
+            In the frames of the conventions page. [1/sr]
+
+        Raises
+        ------
+        ValueError
+            If an angle leaves its range (degrees?), or a wavelength the material's.
+        """
+        shape, columns = self._columns(theta_i, theta_s, dphi, wavelength)
+        return self.surface.matrices(columns).reshape(*shape, 4, 4)
+
+    def coherent(self, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike) -> Array:
+        """Mueller matrix of the mean field: the specular beam, as wide as the incident one.
+
+        Parameters
+        ----------
+        theta_i : array_like
+            Incidence. [rad]
+        wavelength : array_like
+            Vacuum wavelength. [um]
+
+        Returns
+        -------
+        ndarray, shape (..., 4, 4)
+            [..., 0, 0] is the reflectance of unpolarised light. [1]
+        """
+        amplitudes = self._mean_amplitudes(self.surface, theta_i, wavelength)
+        r_s, r_p = amplitudes[..., 0], amplitudes[..., 1]
+        refl_s, refl_p, cross = abs(r_s) ** 2, abs(r_p) ** 2, r_s * r_p.conj()
+        out = np.zeros((*r_s.shape, 4, 4))
+        out[..., 0, 0] = out[..., 1, 1] = 0.5 * (refl_s + refl_p)
+        out[..., 0, 1] = out[..., 1, 0] = 0.5 * (refl_s - refl_p)
+        out[..., 2, 2] = out[..., 3, 3] = cross.real
+        out[..., 2, 3], out[..., 3, 2] = -cross.imag, cross.imag
+        return out
+
+    def profile_scattering(
+        self,
+        theta_i: npt.ArrayLike,
+        theta_view: npt.ArrayLike,
+        wavelength: npt.ArrayLike,
+        *,
+        interference: bool = False,
+    ) -> Array:
+        """Incoherent scattering in plane by a surface that varies along x only.
+
+        Parameters
+        ----------
+        theta_i : array_like
+            Incidence in the x-z plane, in [0, pi/2]. [rad]
+        theta_view : array_like
+            Signed zenith of the detector, positive on the forward side. [rad]
+        wavelength : array_like
+            Vacuum wavelength. [um]
+        interference : bool
+            Add Re and Im of <F_s F_p*>.
+
+        Returns
+        -------
+        ndarray, shape (..., 2) or (..., 4)
+            Power scattered per radian over incident power, for s (field along y) and p;
+            then Re and Im of the interference. [1/rad]
+        """
+        view = require(
+            "theta_view", theta_view, lambda v: np.abs(v) <= np.pi / 2,
+            "lie in [-1.571, 1.571] rad", "Angles are radians; use np.deg2rad.",
+        )  # fmt: skip
+        dphi = np.where(view >= 0, np.pi, 0.0)
+        shape, columns = self._columns(theta_i, np.abs(view), dphi, wavelength)
+        if self.method == "local-curvature":
+            four = profile_curvature(columns, self.profile.heights)
+        else:
+            rows = self.profile.matrices(columns)
+            total, split, real, imag = rows[:, [0, 1, 10, 14]].T
+            four = np.stack([total + split, total - split, real, imag], axis=-1)
+        return four[:, : 4 if interference else 2].reshape(*shape, -1)
+
+    def profile_coherent(self, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike) -> Array:
+        """Specular reflectance of the mean field of a surface that varies along x only.
+
+        Returns
+        -------
+        ndarray, shape (..., 2)
+            For s (field along y) and p. [1]
+        """
+        return np.abs(self._mean_amplitudes(self.profile, theta_i, wavelength)) ** 2
+
+    def _mean_amplitudes(
+        self, scattering: Scattering, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike
+    ) -> Array:
+        """Amplitudes (s, p) of the mean field, shape (..., 2)."""
+        theta, waves = checked_zenith("theta_i", theta_i), checked_wavelength(wavelength)
+        n, kappa = self.material.indices(waves)
+        return scattering.mean_amplitudes(theta, waves, n, kappa)
+
+    def _columns(
+        self,
+        theta_i: npt.ArrayLike,
+        theta_s: npt.ArrayLike,
+        dphi: npt.ArrayLike,
+        wavelength: npt.ArrayLike,
+    ) -> tuple[tuple[int, ...], list[Array]]:
+        """Broadcast shape; zeniths, dphi, wavelength, n, kappa as flat columns."""
+        waves = checked_wavelength(wavelength)
+        n, kappa = self.material.indices(waves)
+        shape, columns = flat_geometry(theta_i, theta_s, dphi, 0.0, waves, n, kappa)
+        del columns[3]
+        size = columns[0].size
+        return shape, [np.ascontiguousarray(np.broadcast_to(c, size)) for c in columns]
+
+
+def checked_wavelength(wavelength: npt.ArrayLike) -> Array:
+    """Wavelengths as an array, all positive."""
+    return require(
+        "wavelength", wavelength, lambda v: (v > 0) & np.isfinite(v), "be positive [um]",
+        "Wavelengths are vacuum wavelengths in micrometres.",
+    )  # fmt: skip

@@ -1,0 +1,87 @@
+"""What every wave form owes to physics: reciprocity, mirror symmetry, realisability."""
+
+import numpy as np
+import pytest
+
+from pbrdf import Material, WaveModel
+from pbrdf.optics import coherency_eigenvalues
+from pbrdf.wave import METHODS
+
+MATERIALS = {
+    "glass": Material(1.5),
+    "metal": Material(1.2, 6.9),
+    "mirror": Material.mirror(),
+    "matched": Material.black(),
+}
+ROUGHNESS = {"polished": (0.01, 1.0), "satin": (0.12, 0.9), "rough": (1.5, 9.0)}
+SURFACES = [
+    {"autocorrelation": "exponential"},
+    {"autocorrelation": "gaussian"},
+    {"autocorrelation": "k-correlation", "exponent": 3.6},
+]
+
+
+def directions(count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Random geometries, with the special ones among them."""
+    rng = np.random.default_rng(seed)
+    theta_i, theta_s = rng.uniform(0, 1.55, (2, count))
+    dphi = rng.uniform(0, 2 * np.pi, count)
+    theta_s[:20] = theta_i[:20]
+    dphi[:10], dphi[10:20] = np.pi, 0.0
+    theta_i[20:30] = 0.0
+    theta_s[26:36] = 0.0
+    return theta_i, theta_s, dphi
+
+
+def check_laws(model: WaveModel, seed: int) -> None:
+    theta_i, theta_s, dphi = directions(300, seed)
+    found = model.brdf(theta_i, theta_s, dphi, 0.6)
+    scale = np.maximum(found[:, :1, :1], 1e-250)
+    assert np.isfinite(found).all()
+
+    back = model.brdf(theta_s, theta_i, -dphi, 0.6)
+    p = np.diag([1.0, 1.0, -1.0, 1.0])
+    assert (np.abs(back - p @ found.swapaxes(1, 2) @ p) / scale).max() < 2e-12
+
+    mirrored = model.brdf(theta_i, theta_s, -dphi, 0.6)
+    flip = np.ones((4, 4))
+    flip[:2, 2:] = flip[2:, :2] = -1
+    assert (np.abs(mirrored - flip * found) / scale).max() < 1e-12
+    assert coherency_eigenvalues(found / scale).min() > -1e-13
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("roughness", ROUGHNESS)
+@pytest.mark.parametrize("material", MATERIALS)
+def test_gaussian_surfaces_obey_the_laws(material, roughness, method) -> None:
+    height, length = ROUGHNESS[roughness]
+    check_laws(
+        WaveModel(
+            MATERIALS[material], height_rms=height, corr_length=length, method=method
+        ),
+        seed=3,
+    )
+
+
+@pytest.mark.parametrize("surface", SURFACES, ids=lambda s: s["autocorrelation"])
+def test_other_surfaces_obey_the_laws(surface) -> None:
+    for method in ("auto", "order-weighted"):
+        check_laws(
+            WaveModel(
+                MATERIALS["metal"],
+                height_rms=0.03,
+                corr_length=1.1,
+                method=method,
+                **surface,
+            ),
+            seed=5,
+        )
+
+
+def test_the_mean_field_is_a_mueller_matrix_of_its_own() -> None:
+    theta = np.linspace(0.0, 1.5, 7)
+    for material in MATERIALS.values():
+        model = WaveModel(material, height_rms=0.05, corr_length=0.5)
+        found = model.coherent(theta, 0.6)
+        assert coherency_eigenvalues(found).min() > -1e-15
+        assert (found[:, 0, 0] + np.abs(found[:, 0, 1]) <= 1.0).all()
