@@ -74,7 +74,9 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     loss : {"linear", "soft_l1", "huber", "cauchy"}
         Robust losses let outliers pull less.
     aperture : Aperture, optional
-        Cones of light of source and detector, folded into the model.
+        Cones of light of source and detector, folded into the model as finely as the noise
+        asks for. Default: the coordinates `source_half_angle` and `detector_half_angle` of
+        the scans; `Aperture()` says that both are points.
     search : {None, "multistart", "crs", "mlsl"}
         Search the whole box of the bounds before the solver polishes.
     seed : int
@@ -113,7 +115,7 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     """
     # Solvers and models load when something is fitted, not when `fitting` is imported
     from fitting.problem.assembly import Question, assemble
-    from fitting.problem.problem import solve_likeliest
+    from fitting.problem.refinement import solve_through_cones
     from fitting.result.make_result import result_of
 
     check_seed(seed)
@@ -132,4 +134,4 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     problems, uncertain = assemble(
         measurement, model, question, use=use, mask=mask, noise=noise
     )
-    return result_of(*solve_likeliest(problems), uncertain)
+    return result_of(*solve_through_cones(problems), uncertain)

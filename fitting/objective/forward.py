@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from fitting.objective.objective import Prediction
-from fitting.readings.aperture import Aperture, rays_through
+from fitting.readings.aperture import Cones, rays_through
 from fitting.readings.mixing import Mixing
 from fitting.readings.observations import LINEAR, NORMALISED, Geometry, Observations
 
@@ -180,7 +180,7 @@ def predict(
     layout: Layout,
     *,
     fixed: Mapping[str, float] | None = None,
-    aperture: Aperture | None = None,
+    cones: Cones | None = None,
 ) -> Prediction:
     """Return the observations as a function of the free parameters.
 
@@ -194,12 +194,12 @@ def predict(
         The free parameters.
     fixed : mapping of str to float, optional
         Values of parameters that are not free, in place of the model's.
-    aperture : Aperture, optional
-        Cones of light.
+    cones : Cones, optional
+        Cones of light, and how finely each is averaged.
     """
     import casadi
 
-    rays = rays_through(observations.geometry, aperture)
+    rays = rays_through(observations.geometry, cones)
     x = casadi.MX.sym("x", len(layout.labels))
     here = {**INSTRUMENT, **model.values(rays.geometry), **(fixed or {})}
     values: dict[str, Any] = {}

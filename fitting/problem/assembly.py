@@ -12,7 +12,7 @@ from fitting.objective.objective import Objective, Prediction
 from fitting.objective.parameters import Parameter, bounded_parameter
 from fitting.problem.gauge import anchored, gauges_of
 from fitting.problem.problem import SOLVERS, Problem
-from fitting.readings.aperture import Aperture
+from fitting.readings.aperture import Aperture, cones_of
 from fitting.readings.noise import Noise, Weights, weights_for
 from fitting.readings.observations import Geometry, Mask, Observations, observe
 
@@ -72,15 +72,14 @@ def assemble(
     )
     parameters = _parameters(adapter, observations, layout, question.bounds, known)
     parameters = _with_squares(parameters, layout, observations)
-    prediction = predict(
-        adapter, observations, layout, fixed=held, aperture=question.aperture
-    )
+    cones = cones_of(observations.geometry, question.aperture)
+    prediction = predict(adapter, observations, layout, fixed=held, cones=cones)
     parameters = _with_scales(parameters, layout, observations, prediction)
     present = {**INSTRUMENT, **adapter.values(observations.geometry), **held}
     gauges = gauges_of(layout, observations, parameters, present, tuple(question.bounds))
     parameters = anchored(parameters, gauges)
     replicas = tuple(
-        predict(one, observations, layout, fixed=held, aperture=question.aperture)
+        predict(one, observations, layout, fixed=held, cones=cones)
         for one in adapter.replicas
     )
     start = np.array([parameter.value for parameter in parameters])
@@ -106,14 +105,22 @@ def assemble(
                 loss=question.loss,
                 solver=question.solver,
                 search=question.search,
-                aperture=question.aperture,
+                cones=cones,
                 seed=question.seed,
                 objective=objective,
                 replicas=replicas,
                 gauges=gauges,
+                cones_stated=question.aperture is not None or _cones_named(observations),
             )
         )
     return problems, {name: known[name][1] for name in outside}
+
+
+def _cones_named(observations: Observations) -> bool:
+    """Tell whether the scans say how wide their cones of light are."""
+    geometry = observations.geometry
+    columns = geometry.source_half_angle, geometry.detector_half_angle
+    return any(one is not None and bool(np.isfinite(one).any()) for one in columns)
 
 
 def _with_scale(question: Question, observations: Observations) -> tuple[str, ...]:

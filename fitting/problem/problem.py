@@ -14,7 +14,7 @@ from fitting.objective.objective import Objective, Prediction
 from fitting.objective.parameters import Parameter
 from fitting.objective.uncertainty import covariance_rows
 from fitting.problem.gauge import Gauge, within_bounds
-from fitting.readings.aperture import Aperture
+from fitting.readings.aperture import Cones
 from fitting.readings.noise import Weights
 from fitting.readings.observations import Observations
 from fitting.solvers.casadi_solver import refine_casadi, solve_casadi
@@ -80,14 +80,16 @@ class Problem:
         The standard errors of the readings.
     loss, solver, search : str
         Loss, solver and global search.
-    aperture : Aperture, optional
-        Cones of light.
+    cones : Cones, optional
+        Cones of light, and how finely each is averaged.
     seed : int
         Seed of the global search.
     objective : Objective
         What the solver sees.
     replicas : tuple of Prediction
         What each independent part of a simulation predicts; none of an exact model.
+    cones_stated : bool
+        False if nobody said how wide the cones of light are.
     gauges : tuple of Gauge
         Parameters that are known only up to a common factor; their anchors are held.
     """
@@ -101,11 +103,12 @@ class Problem:
     loss: str
     solver: str
     search: str | None
-    aperture: Aperture | None
+    cones: Cones | None
     seed: int
     objective: Objective
     replicas: tuple[Prediction, ...] = ()
     gauges: tuple[Gauge, ...] = ()
+    cones_stated: bool = True
 
     def simulation_error(self, x: np.ndarray) -> np.ndarray:
         """Return what the simulation errs in the readings, shape (G, m).
@@ -128,7 +131,7 @@ class Problem:
             self.observations if observations is None else observations,
             self.layout if layout is None else layout,
             fixed=self.fixed,
-            aperture=self.aperture,
+            cones=self.cones,
         )
 
     def m00(self) -> Prediction:

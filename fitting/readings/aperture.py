@@ -1,16 +1,19 @@
 """Finite source and detector: a reading is an average over two cones, not a point.
 
-The average is taken with the seven-point rule on a disc, exact to degree five [1]_,
-weighted with the cosines that irradiance and collected flux carry. The instrument's
-polarisers stay with the axis of each cone while the meridian frames turn across it, near
-the zenith by any angle; the rotation between the two is part of the average.
+Within small cones the facet that mirrors a pair of directions depends on the sum of their
+two displacements alone, if these are taken along and across the facet's plane of incidence:
+both directions make the same angle with its normal. So the average over four numbers is
+one over the sum, where a narrow lobe needs a fine rule, and over what is left, where a
+coarse one does. Displacements are in equal-area coordinates, 2 sin(angle / 2).
 
-References
-----------
-.. [1] M. Abramowitz, I. Stegun, Handbook of Mathematical Functions, 1964, 25.4.61.
+Weights carry the cosines of irradiance and collected flux. The instrument's polarisers stay
+with the axis of each cone while the meridian frames turn across it, near the zenith by any
+angle; the rotation between the two is part of the average.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,7 +21,22 @@ from fitting.readings.observations import Geometry
 from pbrdf.conventions import direction, meridian_frame
 from pbrdf.errors import one_number
 
-__all__ = ["Aperture", "Rays", "rays_through"]
+__all__ = ["FINEST", "Aperture", "Cones", "Rays", "cones_of", "rays_through", "spacing"]
+
+# Rings, points on the outermost ring, and points an axis across the rest, ever finer
+_RULES = (
+    (2, 6, 1),
+    (3, 10, 2),
+    (4, 14, 3),
+    (6, 20, 3),
+    (8, 28, 3),
+    (12, 40, 3),
+    (16, 56, 4),
+    (24, 84, 4),
+    (36, 126, 5),
+)
+FINEST = len(_RULES) - 1
+_LEAST_AROUND = 6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,18 +66,40 @@ class Aperture:
 
 
 @dataclass(frozen=True, eq=False)
+class Cones:
+    """Cones of light of N readings, and how finely each is averaged.
+
+    Parameters
+    ----------
+    source, detector : ndarray, shape (N,)
+        Half-angles. [rad]
+    level : ndarray of int, shape (N,)
+        Rule of each average, 0 to `FINEST`.
+    """
+
+    source: np.ndarray
+    detector: np.ndarray
+    level: np.ndarray
+
+    def at(self, index: np.ndarray, level: np.ndarray | None = None) -> "Cones":
+        """Return those of some readings, at other levels if given."""
+        chosen = self.level[index] if level is None else level
+        return Cones(self.source[index], self.detector[index], chosen)
+
+
+@dataclass(frozen=True, eq=False)
 class Rays:
     """Directions whose weighted sum is a reading; K for each of N readings.
 
     Parameters
     ----------
     geometry : Geometry
-        The N K directions.
-    parent : ndarray of int, shape (N K,)
+        The directions of all readings, those of one in succession.
+    parent : ndarray of int, shape (R,)
         Reading each belongs to.
-    weight : ndarray, shape (N K,)
+    weight : ndarray, shape (R,)
         Sums to 1 over each reading.
-    turn_in, turn_out : ndarray, shape (N K, 4, 4)
+    turn_in, turn_out : ndarray, shape (R, 4, 4)
         Stokes rotations: instrument to meridian frame of the source, and meridian frame to
         instrument at the detector. The reading is the sum of weight turn_out M turn_in.
     """
@@ -71,89 +111,221 @@ class Rays:
     turn_out: np.ndarray
 
 
-def rays_through(geometry: Geometry, aperture: Aperture | None) -> Rays:
-    """Return the directions to evaluate for readings taken through an aperture.
+def cones_of(geometry: Geometry, aperture: Aperture | None) -> Cones | None:
+    """Return the cones of light, None if all are points.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Half-angles of the scans, where they name any.
+    aperture : Aperture, optional
+        In place of those of the scans.
+
+    Raises
+    ------
+    ValueError
+        If a half-angle of a scan is no cone of light.
+    """
+    found = []
+    for end in ("source", "detector"):
+        if aperture is not None:
+            found.append(np.full(geometry.size, getattr(aperture, end)))
+            continue
+        column = getattr(geometry, f"{end}_half_angle")
+        angles = np.zeros(geometry.size) if column is None else np.nan_to_num(column)
+        wrong = ~((angles >= 0.0) & (angles < 0.5))
+        if wrong.any():
+            msg = (
+                f"{end}_half_angle must lie in [0, 0.5) rad, got {angles[wrong][0]:g} at "
+                f"geometry {np.flatnonzero(wrong)[0]}. Angles are radians; use np.deg2rad."
+            )
+            raise ValueError(msg)
+        found.append(angles)
+    if not any(angles.any() for angles in found):
+        return None
+    return Cones(found[0], found[1], np.zeros(geometry.size, dtype=int))
+
+
+def spacing(cones: Cones) -> np.ndarray:
+    """Return the largest step between the sums of displacements, shape (N,). [rad]"""
+    rings, around, _ = np.array(_RULES)[cones.level].T
+    reach = cones.source + cones.detector
+    return np.maximum(reach / rings, 2.0 * np.pi * reach / around)
+
+
+def rays_through(geometry: Geometry, cones: Cones | None) -> Rays:
+    """Return the directions to evaluate for readings taken through cones of light.
 
     Examples
     --------
     >>> one = Geometry(*(np.array([v]) for v in (0.5, 0.3, 3.0, 0.0, np.nan)))
-    >>> rays_through(one, Aperture(detector=0.02)).weight.round(3)
-    array([0.25 , 0.126, 0.126, 0.125, 0.124, 0.124, 0.125])
+    >>> rays = rays_through(one, cones_of(one, Aperture(detector=0.02)))
+    >>> len(rays.weight), float(rays.weight.sum().round(12))
+    (12, 1.0)
     """
-    unity = np.broadcast_to(np.eye(4), (geometry.size, 4, 4))
-    if aperture is None or (aperture.source == 0.0 and aperture.detector == 0.0):
+    if cones is None:
+        unity = np.broadcast_to(np.eye(4), (geometry.size, 4, 4))
         index = np.arange(geometry.size)
         return Rays(geometry, index, np.ones(geometry.size), unity, unity)
 
+    parents, shifts_i, shifts_s, shares = [], [], [], []
+    keys = np.stack([cones.source, cones.detector, cones.level], axis=1)
+    for key in np.unique(keys, axis=0):
+        members = np.flatnonzero((keys == key).all(axis=1))
+        at_source, at_detector, share = _pairs(float(key[0]), float(key[1]), int(key[2]))
+        parents.append(np.repeat(members, len(share)))
+        shifts_i.append(np.tile(at_source, (len(members), 1)))
+        shifts_s.append(np.tile(at_detector, (len(members), 1)))
+        shares.append(np.tile(share, len(members)))
+    order = np.argsort(np.concatenate(parents), kind="stable")
+    parent, share = np.concatenate(parents)[order], np.concatenate(shares)[order]
+    shift_i, shift_s = np.concatenate(shifts_i)[order], np.concatenate(shifts_s)[order]
+
     phi_s = geometry.phi_i + geometry.dphi
-    source = _cone(geometry.theta_i, geometry.phi_i, aperture.source, sense=-1.0)
-    detector = _cone(geometry.theta_s, phi_s, aperture.detector, sense=1.0)
-    k_i, k_s = source[0].shape[1], detector[0].shape[1]
-    pairs = (geometry.size, k_i, k_s)
-
-    def of_source(values: np.ndarray) -> np.ndarray:
-        spread = np.broadcast_to(values[:, :, None], (*pairs, *values.shape[2:]))
-        return spread.reshape(-1, *values.shape[2:])
-
-    def of_detector(values: np.ndarray) -> np.ndarray:
-        spread = np.broadcast_to(values[:, None, :], (*pairs, *values.shape[2:]))
-        return spread.reshape(-1, *values.shape[2:])
-
-    parent = np.repeat(np.arange(geometry.size), k_i * k_s)
-    weight = of_source(source[2]) * of_detector(detector[2])
-    weight = weight / np.bincount(parent, weight)[parent]
-    phi_i = of_source(source[1])
+    axis_i = direction(geometry.theta_i, geometry.phi_i)
+    axis_s = direction(geometry.theta_s, phi_s)
+    across = _across(axis_i, axis_s, geometry.phi_i)[parent]
+    source = _cone(axis_i[parent], geometry.phi_i[parent], across, shift_i, sense=-1.0)
+    detector = _cone(axis_s[parent], phi_s[parent], across, shift_s, sense=1.0)
+    weight = share * source[2] * detector[2]
     return Rays(
         geometry=Geometry(
-            theta_i=of_source(source[0]),
-            theta_s=of_detector(detector[0]),
-            dphi=of_detector(detector[1]) - phi_i,
-            phi_i=phi_i,
+            theta_i=source[0],
+            theta_s=detector[0],
+            dphi=detector[1] - source[1],
+            phi_i=source[1],
             wavelength=geometry.wavelength[parent],
         ),
         parent=parent,
-        weight=weight,
-        turn_in=of_source(source[3]),
+        weight=weight / np.bincount(parent, weight)[parent],
+        turn_in=source[3],
         # Back from the meridian frame: the transpose of the rotation into it
-        turn_out=of_detector(detector[3]).transpose(0, 2, 1),
+        turn_out=detector[3].transpose(0, 2, 1),
     )
 
 
-def _cone(
-    theta: np.ndarray, phi: np.ndarray, half_angle: float, *, sense: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return theta, phi, weight (N, K) and rotation into the meridian frame (N, K, 4, 4).
+@lru_cache(maxsize=256)
+def _pairs(
+    source: float, detector: float, level: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return displacements (K, 2) at source and detector, and their shares (K,).
 
+    Rings of the sum w, and for each w a rule over the lens of displacements a of the source
+    for which w - a lies in the detector's disc.
+    """
+    r_i, r_s = 2.0 * np.sin(0.5 * source), 2.0 * np.sin(0.5 * detector)
+    if r_i + r_s == 0.0:
+        return np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1)
+    rings, around, rest = _RULES[level]
+    edges = np.unique([0.0, abs(r_i - r_s), r_i + r_s])
+    at_source, at_detector, shares = [], [], []
+    for low, high in pairwise(edges.tolist()):
+        count = max(2, int(np.ceil(rings * (high - low) / edges[-1])))
+        node, weight = np.polynomial.legendre.leggauss(count)
+        radii = 0.5 * (low + high) + 0.5 * (high - low) * node
+        for number, (radius, part) in enumerate(zip(radii, weight, strict=True)):
+            points, area = _lens(radius, r_i, r_s, rest)
+            turns = max(_LEAST_AROUND, int(np.ceil(around * radius / edges[-1])))
+            # Rings are staggered, so that no direction has all the points
+            angle = (np.arange(turns) + 0.5 * (number % 2)) * (2.0 * np.pi / turns)
+            along = np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, None, :]
+            aside = np.stack([-np.sin(angle), np.cos(angle)], axis=1)[:, None, :]
+            a = points[:, 0, None] * along + points[:, 1, None] * aside
+            at_source.append(a.reshape(-1, 2))
+            at_detector.append((radius * along - a).reshape(-1, 2))
+            ring = part * (high - low) * radius / turns
+            shares.append(np.tile(ring * area, turns))
+    share = np.concatenate(shares)
+    return np.concatenate(at_source), np.concatenate(at_detector), share / share.sum()
+
+
+def _lens(w: float, r_i: float, r_s: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return points (along w, aside) where two discs overlap, and the area each stands for.
+
+    One disc of radius r_i about 0, one of r_s about w.
+    """
+    if r_i == 0.0:
+        return np.zeros((1, 2)), np.ones(1)
+    if r_s == 0.0:
+        return np.array([[w, 0.0]]), np.ones(1)
+    if w**2 + r_i**2 <= r_s**2:
+        height = r_i
+    elif w**2 + r_s**2 <= r_i**2:
+        height = r_s
+    else:
+        foot = (w**2 + r_i**2 - r_s**2) / (2.0 * w)
+        height = np.sqrt(max(r_i**2 - foot**2, 0.0))
+    node, weight = np.polynomial.legendre.leggauss(count)
+    aside = height * np.sin(0.5 * np.pi * node)
+    slab = weight * np.cos(0.5 * np.pi * node)
+    half_i, half_s = (np.sqrt(np.maximum(r**2 - aside**2, 0.0)) for r in (r_i, r_s))
+    low, high = np.maximum(-half_i, w - half_s), np.minimum(half_i, w + half_s)
+    middle, half = 0.5 * (low + high), 0.5 * np.maximum(high - low, 0.0)
+    along = middle[:, None] + half[:, None] * node
+    area = (slab * half)[:, None] * weight
+    points = np.stack([along, np.broadcast_to(aside[:, None], along.shape)], axis=-1)
+    area = area * (_overlap(w, r_i, r_s) / max(float(area.sum()), 1e-300))
+    return points.reshape(-1, 2), area.ravel()
+
+
+def _overlap(w: float, r_i: float, r_s: float) -> float:
+    """Return the area that two discs at a distance w share."""
+    if w <= abs(r_i - r_s):
+        return float(np.pi * min(r_i, r_s) ** 2)
+    if w >= r_i + r_s:
+        return 0.0
+    to_i, to_s = (
+        np.arccos(np.clip((w**2 + r**2 - other**2) / (2.0 * w * r), -1.0, 1.0))
+        for r, other in ((r_i, r_s), (r_s, r_i))
+    )
+    corners = (r_i + r_s) ** 2 - w**2, w**2 - (r_i - r_s) ** 2
+    kite = 0.5 * np.sqrt(max(corners[0] * corners[1], 0.0))
+    return float(r_i**2 * to_i + r_s**2 * to_s - kite)
+
+
+def _across(axis_i: np.ndarray, axis_s: np.ndarray, phi_i: np.ndarray) -> np.ndarray:
+    """Return the unit normal of the facet's plane of incidence, shape (N, 3)."""
+    normal = np.cross(axis_i, axis_s)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    # Light that goes straight back has no such plane; any serves
+    level = np.stack([-np.sin(phi_i), np.cos(phi_i), np.zeros_like(phi_i)], axis=-1)
+    return np.where(length > 1e-7, normal / np.maximum(length, 1e-300), level)
+
+
+def _cone(
+    axis: np.ndarray,
+    phi: np.ndarray,
+    across: np.ndarray,
+    shift: np.ndarray,
+    *,
+    sense: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return theta, phi, cosine (R,) and rotation into the meridian frame (R, 4, 4).
+
+    `shift` (R, 2) is the displacement along `across` and in the plane across the axis.
     `sense` is +1 where light leaves along the direction, -1 where it arrives.
     """
-    radius = np.array([0.0, *[np.sqrt(2.0 / 3.0)] * 6]) * np.tan(half_angle)
-    share = np.array([0.25, *[0.125] * 6])
-    if half_angle == 0.0:
-        radius, share = radius[:1], np.ones(1)
-    around = np.arange(len(radius)) * (np.pi / 3.0)
-
-    axis = direction(theta, phi)
-    e_s, e_p = meridian_frame(sense * axis, phi if sense > 0.0 else phi + np.pi)
-    across = np.cos(around)[:, None] * e_s[:, None] + np.sin(around)[:, None] * e_p[:, None]
-    leaves = axis[:, None] + radius[:, None] * across
-    leaves = leaves / np.linalg.norm(leaves, axis=-1, keepdims=True)
+    square = np.sum(shift**2, axis=-1, keepdims=True)
+    aside = shift[:, :1] * across + shift[:, 1:] * np.cross(across, axis)
+    leaves = axis * (1.0 - 0.5 * square) + aside * np.sqrt(1.0 - 0.25 * square)
 
     # What has sunk below the horizon carries no light
-    up = np.maximum(leaves[..., 2], 0.0)
-    zenith = np.arctan2(np.hypot(leaves[..., 0], leaves[..., 1]), np.maximum(up, 1e-12))
-    azimuth = np.arctan2(leaves[..., 1], leaves[..., 0])
-    azimuth = np.where(radius > 0.0, azimuth, phi[:, None])
+    up = np.maximum(leaves[:, 2], 0.0)
+    zenith = np.arctan2(np.hypot(leaves[:, 0], leaves[:, 1]), np.maximum(up, 1e-12))
+    azimuth = np.arctan2(leaves[:, 1], leaves[:, 0])
+    azimuth = np.where(square[:, 0] > 0.0, azimuth, phi)
 
     # The polariser's axis, carried along with the least rotation
-    carried = e_s[:, None] - np.sum(e_s[:, None] * leaves, -1, keepdims=True) * leaves
+    behind = 0.0 if sense > 0.0 else np.pi
+    e_s, _ = meridian_frame(sense * axis, phi + behind)
+    carried = e_s - np.sum(e_s * leaves, -1, keepdims=True) * leaves
     carried = carried / np.linalg.norm(carried, axis=-1, keepdims=True)
     carried_p = np.cross(sense * leaves, carried)
-    own_azimuth = azimuth if sense > 0.0 else azimuth + np.pi
-    own_s, _ = meridian_frame(sense * leaves, own_azimuth)
+    own_s, _ = meridian_frame(sense * leaves, azimuth + behind)
     cosine, sine = np.sum(own_s * carried, -1), np.sum(own_s * carried_p, -1)
-    turn = np.zeros((*cosine.shape, 4, 4))
-    turn[..., 0, 0] = turn[..., 3, 3] = 1.0
-    turn[..., 1, 1] = turn[..., 2, 2] = cosine**2 - sine**2
-    turn[..., 1, 2] = 2.0 * sine * cosine
-    turn[..., 2, 1] = -2.0 * sine * cosine
-    return zenith, azimuth, share * up, turn
+    turn = np.zeros((len(cosine), 4, 4))
+    turn[:, 0, 0] = turn[:, 3, 3] = 1.0
+    turn[:, 1, 1] = turn[:, 2, 2] = cosine**2 - sine**2
+    turn[:, 1, 2] = 2.0 * sine * cosine
+    turn[:, 2, 1] = -2.0 * sine * cosine
+    return zenith, azimuth, up, turn

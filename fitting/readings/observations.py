@@ -74,6 +74,12 @@ class Geometry:
         """Number of geometries."""
         return len(self.theta_i)
 
+    def at(self, index: np.ndarray) -> "Geometry":
+        """Return the directions of these numbers."""
+        columns = {column.name: getattr(self, column.name) for column in fields(self)}
+        given = {name: one for name, one in columns.items() if one is not None}
+        return Geometry(**{name: one[index] for name, one in given.items()})
+
     @property
     def theta_view(self) -> np.ndarray:
         """Signed view angle, positive on the forward side; nan out of plane. [rad]"""

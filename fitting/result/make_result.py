@@ -17,6 +17,7 @@ from fitting.objective.uncertainty import (
     sandwich,
 )
 from fitting.problem.problem import Problem, Solved
+from fitting.problem.refinement import cone_warnings
 from fitting.result.fit_result import FitResult
 from fitting.result.identifiability import identifiability_warnings, misfit_warnings
 
@@ -71,6 +72,7 @@ def result_of(
             p_value = float(stats.chi2.sf(chi2, dof))
         warnings += identifiability_warnings(problem, solved, found)
         warnings += misfit_warnings(problem, solved, p_value)
+        warnings += cone_warnings(problem, solved)
 
     values = dict(zip(labels, solution.x.tolist(), strict=True))
     stderr = dict(zip(labels, np.sqrt(np.diag(covariance)).tolist(), strict=True))

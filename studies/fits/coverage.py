@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from fitting import Noise
-from fitting import run as fit
+from fitting import Noise, fit
 from fitting.objective.uncertainty import information
 from pbrdf import Material, MicrofacetModel
 

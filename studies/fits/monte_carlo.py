@@ -13,8 +13,7 @@ import time
 import numpy as np
 import xarray as xr
 
-from fitting import SimulatedModel
-from fitting import run as fit
+from fitting import SimulatedModel, fit
 from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene, simulate
 
 SURFACE = GaussianSurface(shape=(256, 256), spacing=1.0, corr_length=12.0, slope_rms=0.30)

@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from data_io import read_goniometer, read_height_map
-from fitting import Noise, surface_statistics
-from fitting import run as fit
+from fitting import Noise, fit, surface_statistics
 from fitting.models.analytic import AnalyticModel
 from pbrdf import Material, MicrofacetModel
 

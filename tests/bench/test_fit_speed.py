@@ -5,8 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from fitting import SimulatedModel
-from fitting import run as fit
+from fitting import SimulatedModel, fit
 from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene
 from tests.fits.scans import scan
 

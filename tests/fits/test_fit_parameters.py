@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from fitting import Aperture, Noise, compare, f_test, fit, profile_likelihood
 from fitting.models.analytic import AnalyticModel
 from fitting.objective.forward import Layout, predict
+from fitting.readings.aperture import cones_of
 from fitting.readings.masks import blocked_detector, saturated, zeros
 from fitting.readings.observations import observe
 from fitting.result.likelihood import allowed_rise
@@ -269,9 +270,10 @@ def test_aperture_average_equals_a_dense_average():
     measurement = scan(narrow, elements=("M00",), step=5.0)
     readings = observe({"0": measurement})
     layout = Layout.of(("specular_gain",), readings)
-    through = predict(
-        AnalyticModel(narrow), readings, layout, aperture=Aperture(detector=half)
-    )
+    cones = cones_of(readings.geometry, Aperture(detector=half))
+    level = np.full(readings.geometry.size, 4)
+    fine = cones.at(np.arange(level.size), level)
+    through = predict(AnalyticModel(narrow), readings, layout, cones=fine)
     rng = np.random.default_rng(0)
     k = 21
     theta, dphi = readings.geometry.theta_s[k], readings.geometry.dphi[k]
@@ -314,7 +316,7 @@ def test_aperture_at_the_zenith_keeps_the_polarisation_of_its_axis():
         AnalyticModel(sample),
         readings,
         layout,
-        aperture=Aperture(detector=0.02, source=0.01),
+        cones=cones_of(readings.geometry, Aperture(detector=0.02, source=0.01)),
     )
     assert_allclose(cone.function([1.0]).full(), axis.function([1.0]).full(), rtol=5e-3)
 

@@ -9,8 +9,7 @@ import xarray as xr
 from numpy.testing import assert_allclose
 
 from data_io import read_model, write_goniometer
-from fitting import SimulatedModel
-from fitting import run as fit
+from fitting import SimulatedModel, fit
 from fitting.models.index_grid import IndexGrid
 from fitting.models.simulated_trace import interpolate_bins, merged
 from fitting.readings.observations import Geometry

@@ -1,6 +1,7 @@
 """`pbrdf fit`: bring the analytical model, or a simulated surface, to scans."""
 
 import json
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -54,6 +55,24 @@ def command(
     shadowing: options.Shadowing = "smith-correlated",
     wavelength: options.Wavelength = None,
     blocked: options.Blocked = 0.0,
+    source_half_angle: Annotated[
+        float | None,
+        typer.Option(
+            "--source-half-angle-deg",
+            min=0.0,
+            max=28.0,
+            help="Half-angle of the source, in place of the file's; 0 for a point.",
+        ),
+    ] = None,
+    detector_half_angle: Annotated[
+        float | None,
+        typer.Option(
+            "--detector-half-angle-deg",
+            min=0.0,
+            max=28.0,
+            help="Half-angle of the detector, in place of the file's; 0 for a point.",
+        ),
+    ] = None,
     solver: Annotated[str, typer.Option(help="casadi or nlopt.")] = "casadi",
     loss: Annotated[
         str, typer.Option(help="linear, or soft_l1, huber, cauchy against outliers.")
@@ -76,7 +95,15 @@ def command(
     from pbrdf.cli.reading import read_scan
     from pbrdf.cli.staging import staged_folder
 
-    measured = {path.stem: read_scan(path, wavelength=wavelength) for path in scans}
+    cones = {
+        "source_half_angle": source_half_angle,
+        "detector_half_angle": detector_half_angle,
+    }
+    radians = {name: math.radians(v) for name, v in cones.items() if v is not None}
+    measured = {
+        path.stem: read_scan(path, wavelength=wavelength).assign_coords(radians)
+        for path in scans
+    }
     if len(measured) < len(scans):
         msg = "scans must have names of their own, got two files of one name. Rename one."
         raise ValueError(msg)
