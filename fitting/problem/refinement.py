@@ -137,8 +137,8 @@ def cone_warnings(problem: Problem, solved: Solved) -> list[str]:
             return [
                 f"the lobe of slope_rms {smallest:.2g} is as narrow as the cones of light "
                 f"of goniometers: a half-angle of {np.rad2deg(half_angle):.2g} degrees "
-                f"changes slope_rms by {_CHANGE:.0%}, and none was given; say how wide they "
-                "are (source and detector half-angle, 0 for a point)"
+                f"changes slope_rms by {_CHANGE:.0%}, and none was given; say how wide "
+                "they are (source and detector half-angle, 0 for a point)"
             ]
     if problem.cones is None or (problem.cones.level < FINEST).all():
         return []
