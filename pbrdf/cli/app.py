@@ -16,6 +16,8 @@ import typer
 
 from pbrdf import __version__
 from pbrdf.cli import measuring, predicting, showing
+from pbrdf.cli.progress import Talk, talk
+from pbrdf.cli.wording import in_options, options_of
 
 __all__ = ["app", "main"]
 
@@ -26,7 +28,8 @@ app = typer.Typer(
     name="pbrdf",
     help="Polarised reflectance of real rough surfaces: measured, simulated and fitted.",
     no_args_is_help=False,
-    add_completion=False,
+    add_completion=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -46,8 +49,19 @@ def _options(
             "--version", callback=_version, is_eager=True, help="Show the version."
         ),
     ] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="No progress and no remarks on stderr.")
+    ] = False,
+    verbose: Annotated[
+        bool,
+        typer.Option("--verbose", "-v", help="Where an error was raised, and each stage."),
+    ] = False,
 ) -> None:
-    """Polarised reflectance of real rough surfaces: measured, simulated and fitted."""
+    """Polarised reflectance of real rough surfaces: measured, simulated and fitted.
+
+    --quiet and --verbose stand before the command: pbrdf --quiet simulate scene.toml
+    """
+    talk(Talk.QUIET if quiet else Talk.VERBOSE if verbose else Talk.NORMAL)
 
 
 def _commands() -> Iterator[tuple[str, Callable[..., Any]]]:
@@ -75,9 +89,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     -------
     int
         0, 2 for input that cannot be used, 130 when interrupted. A fault of the program
-        itself is not caught. PBRDF_TRACEBACK=1 shows where an error was raised.
+        itself is not caught. --verbose shows where an error was raised.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
+    talk(Talk.NORMAL)
     with warnings.catch_warnings():
         warnings.showwarning = _one_line_warning
         try:
@@ -87,7 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except typer.TyperException as error:
             return _fail(error, _usage(error, arguments))
         except (ValueError, OSError) as error:
-            return _fail(error, _sentence(error))
+            return _fail(error, _in_words_of_the_command(_sentence(error), arguments))
         except (KeyboardInterrupt, typer.Abort):
             typer.echo("Interrupted; nothing was written.", err=True)
             return INTERRUPTED
@@ -95,10 +110,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fail(error: Exception, message: str) -> int:
-    if os.environ.get("PBRDF_TRACEBACK"):
+    if os.environ.get("PBRDF_TRACEBACK") or talk() is Talk.VERBOSE:
         raise error
     typer.echo(f"error: {message}", err=True)
     return BAD_INPUT
+
+
+def _command_of(arguments: Sequence[str]) -> str | None:
+    """Name of the command among the arguments."""
+    return next((word for word in arguments if word in COMMANDS), None)
+
+
+def _in_words_of_the_command(sentence: str, arguments: Sequence[str]) -> str:
+    name = _command_of(arguments)
+    if name is None:
+        return sentence
+    parsed: Any = typer.main.get_command(app)
+    return in_options(sentence, options_of(parsed.commands[name].params))
 
 
 def _sentence(error: Exception) -> str:
@@ -120,9 +148,10 @@ def _usage(error: typer.TyperException, arguments: Sequence[str]) -> str:
     if option and option[1] in arguments[:-1]:
         value = arguments[arguments.index(option[1]) + 1]
         sentence = f"{sentence.rstrip('.')}, got {value!r}."
-    name = next((f"{word} " for word in arguments if word in COMMANDS), "")
-    return f"{sentence} See `pbrdf {name}--help`."
+    name = _command_of(arguments)
+    return f"{sentence} See `pbrdf {f'{name} ' if name else ''}--help`."
 
 
 def _one_line_warning(message: Warning | str, *_: object, **__: object) -> None:
-    typer.echo(f"warning: {' '.join(str(message).split())}", err=True)
+    if talk() is not Talk.QUIET:
+        typer.echo(f"warning: {' '.join(str(message).split())}", err=True)

@@ -35,8 +35,10 @@ __all__ = [
     "Wavelength",
     "Wavelengths",
     "Workers",
+    "angles",
     "azimuths",
     "form",
+    "incidences",
     "names",
     "numbers",
 ]
@@ -188,7 +190,15 @@ Target = Annotated[
     float | None,
     typer.Option("--target-rel-error", min=1e-6, max=0.999, help="Go on to this error."),
 ]
-Bounces = Annotated[int | None, typer.Option("--max-bounces", min=1, max=10_000)]
+Bounces = Annotated[
+    int | None,
+    typer.Option(
+        "--max-bounces",
+        min=1,
+        max=10_000,
+        help="Follow paths no further; what is left counts as truncated.",
+    ),
+]
 ThetaBins = Annotated[int, typer.Option("--n-theta", min=1, max=2000, help="Zenith bins.")]
 DphiBins = Annotated[int, typer.Option("--n-dphi", min=2, max=4000, help="Azimuth bins.")]
 StokesOption = Annotated[
@@ -224,6 +234,33 @@ def numbers(text: str, option: str) -> list[float]:
             msg = f"{option} must be numbers separated by commas, got {word!r} in {text!r}."
             raise ValueError(msg) from None
     return found
+
+
+def incidences(text: str) -> list[float]:
+    """Return zenith angles of a list in degrees. [rad]
+
+    Raises
+    ------
+    ValueError
+        If one is not below the horizon's 90 degrees.
+    """
+    return angles(text, "--theta-i-deg", below=90.0)
+
+
+def angles(text: str, option: str, *, below: float) -> list[float]:
+    """Return the angles of a list in degrees, from 0 on and below a limit. [rad]
+
+    Raises
+    ------
+    ValueError
+        If one is not.
+    """
+    found = numbers(text, option)
+    for value in found:
+        if not 0.0 <= value < below:
+            msg = f"{option} must lie in [0, {below:g}) degrees, got {value:g} in {text!r}."
+            raise ValueError(msg)
+    return [math.radians(value) for value in found]
 
 
 def azimuths(text: str) -> "str | float | list[float]":

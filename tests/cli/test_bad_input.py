@@ -37,7 +37,7 @@ def refusal(
     lines = [
         line
         for line in capsys.readouterr().err.splitlines()
-        if not line.startswith("warning: ")
+        if not line.startswith(("warning: ", "note: "))
     ]
     assert len(lines) == 1, lines
     assert lines[0].startswith("error: ")
@@ -181,17 +181,20 @@ BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
     "wavelength not there": ([*PIPELINE, "--wavelength-um", "0.5"], "--wavelength-um"),
     "incidence beyond grazing": (
         ["simulate", "scene.toml", "--theta-i-deg", "95"],
-        "theta_i",
+        "--theta-i-deg",
     ),
     "incidence in words": (["simulate", "scene.toml", "--theta-i-deg", "steep"], "steep"),
-    "odd azimuth bins": (["simulate", "scene.toml", "--n-dphi", "45"], "n_dphi"),
+    "odd azimuth bins": (["simulate", "scene.toml", "--n-dphi", "45"], "--n-dphi"),
     "unknown stokes": (["simulate", "scene.toml", "--stokes", "V"], "--stokes"),
     "scene that is none": (["simulate", "scan.csv"], "scan.csv"),
     "sweep of nothing": (["sweep", "scene.toml", "--vary", "gloss=1"], "gloss"),
     "sweep out of range": (["sweep", "scene.toml", "--vary", "kappa=-1"], "kappa"),
     "plot of nothing": (["plot", "profile.csv"], "profile.csv"),
     "export to nowhere": (["export", "scene.toml", "-o", "scene.obj"], ".pbsdf"),
-    "dew beyond 180 degrees": (["dew", "--contact-angles-deg", "15,200"], "contact_angle"),
+    "dew beyond 180 degrees": (
+        ["dew", "--contact-angles-deg", "15,200"],
+        "--contact-angles-deg",
+    ),
     "dew on what is no scene": (["dew", "--scene", "scan.csv"], "scan.csv"),
     "dew of an unknown kind": (["dew", "--sizes", "gamma"], "sizes"),
     "dew without room": (["dew", "--volume-per-area-um", "100"], "room"),

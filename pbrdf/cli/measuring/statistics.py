@@ -40,7 +40,8 @@ def command(
         typer.Option(help="Draw the height and slope histograms here (png, pdf)."),
     ] = None,
     as_json: Annotated[
-        Path | None, typer.Option("--json", help="Write all numbers here.")
+        Path | None,
+        typer.Option("--json", help="Write all numbers here; - is standard output."),
     ] = None,
     scale_bar_um: Annotated[
         float | None,
@@ -90,15 +91,21 @@ def command(
 
     found = surface_statistics(heights, form=options.form(form))
     if as_json is not None:
-        with staged_file(as_json, force=force) as stage:
-            stage.write_text(json.dumps(found.to_dict(), indent=2) + "\n", encoding="utf-8")
+        text = json.dumps(found.to_dict(), indent=2)
+        if str(as_json) == "-":
+            typer.echo(text)
+        else:
+            with staged_file(as_json, force=force) as stage:
+                stage.write_text(f"{text}\n", encoding="utf-8")
     if figure is not None:
         from fitting.report.figures import histogram_figure
 
         with staged_file(figure, force=force) as stage:
             histograms = [found.height_histogram(), found.slope_histogram()]
             histogram_figure(histograms).savefig(stage, dpi=140)
-    typer.echo(str(found))
+    # Standard output then holds the numbers and nothing else
+    if str(as_json) != "-":
+        typer.echo(str(found))
 
 
 def _draw_overlay(overlay: Path, surface: Path, heights: Any, *, force: bool) -> None:

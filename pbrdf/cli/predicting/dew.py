@@ -101,15 +101,15 @@ def command(
             )
             raise ValueError(msg)
         surface, substrate = loaded.surface, loaded.substrate
-    angles = np.deg2rad(options.numbers(contact_angles, "--contact-angles-deg"))
-    incidences = np.deg2rad(options.numbers(theta_i, "--theta-i-deg"))
+    angles = options.angles(contact_angles, "--contact-angles-deg", below=180.0)
+    incidences = options.incidences(theta_i)
     target = output or Path("dew")
     with staged_folder(target, force=force) as stage:
         with progress_bar("tracing") as progress:
             result = compare_dew(
                 surface,
                 substrate,
-                angles.tolist(),
+                angles,
                 incidences,
                 amount={
                     "volume_per_area": volume,

@@ -53,7 +53,7 @@ def command(
         with progress_bar("tracing") as progress:
             result = pbrdf.simulate(
                 loaded,
-                np.deg2rad(options.numbers(theta_i, "--theta-i-deg")),
+                options.incidences(theta_i),
                 phi_i=options.azimuths(phi_i),
                 n_rays=n_rays,
                 realizations=realizations,

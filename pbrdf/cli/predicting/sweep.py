@@ -82,7 +82,7 @@ def command(
         for step, (variant, values) in enumerate(zip(scenes, combinations, strict=True)):
             result = pbrdf.simulate(
                 variant,
-                np.deg2rad(options.numbers(theta_i, "--theta-i-deg")),
+                options.incidences(theta_i),
                 phi_i=options.azimuths(phi_i),
                 n_rays=n_rays,
                 realizations=realizations,

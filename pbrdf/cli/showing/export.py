@@ -10,6 +10,8 @@ from pbrdf.cli import options
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pbrdf import MicrofacetModel
+
 
 def command(
     source: Annotated[
@@ -23,35 +25,58 @@ def command(
             help=".pbsdf: polarised measured BSDF of Mitsuba 3. .csv: goniometer table.",
         ),
     ],
+    theta_i: options.Incidences = "30,60",
     force: options.Force = False,
     wavelength: options.Wavelength = None,
 ) -> None:
     """Write a simulated or fitted BRDF for a renderer, or as a table.
+
+    A table of a model has the incidences of --theta-i-deg and the hemisphere by 5 degrees;
+    that of a result has the bins of the result.
 
     Example: pbrdf export model.toml -o vinyl.pbsdf
     """
     import data_io
     from pbrdf.cli.staging import staged_file
 
-    writers = {".pbsdf": "Mitsuba", ".csv": "table"}
-    if output.suffix not in writers:
-        msg = f"--output must end in {' or '.join(writers)}, got {output.name!r}."
+    if output.suffix not in (".pbsdf", ".csv"):
+        msg = f"--output must end in .pbsdf or .csv, got {output.name!r}."
         raise ValueError(msg)
     if source.suffix not in (".nc", ".toml"):
         msg = f"source must be a result (.nc) or a model (.toml), got {source.name!r}."
         raise ValueError(msg)
-    if output.suffix == ".csv" and source.suffix == ".toml":
-        msg = f"a table needs the geometries of a result (.nc), got {source.name!r}."
-        raise ValueError(msg)
     with staged_file(output, force=force) as stage:
         if source.suffix == ".toml":
             model = data_io.read_model(source)
-            data_io.export_mitsuba(model, stage, wavelength=wavelength)
+            if output.suffix == ".csv":
+                incidences = options.incidences(theta_i)
+                data_io.write_goniometer(model_rows(model, incidences, wavelength), stage)
+            else:
+                data_io.export_mitsuba(model, stage, wavelength=wavelength)
         elif output.suffix == ".csv":
             data_io.write_goniometer(as_rows(data_io.read_result(source)), stage)
         else:
             data_io.export_mitsuba(data_io.read_result(source), stage)
     typer.echo(f"Written: {output}")
+
+
+def model_rows(
+    model: "MicrofacetModel", incidences: list[float], wavelength: float | None
+) -> "xr.Dataset":
+    """Return goniometer rows of a model over the hemisphere, all sixteen elements."""
+    import numpy as np
+    import xarray as xr
+
+    steps = np.radians(5.0) * np.arange(17), np.radians(5.0) * np.arange(72)
+    theta_i, theta_s, dphi = (
+        axis.ravel() for axis in np.meshgrid(incidences, *steps, indexing="ij")
+    )
+    brdf = model.brdf(theta_i, theta_s, dphi, wavelength=wavelength)
+    rows = {f"M{i}{j}": ("geometry", brdf[:, i, j]) for i in range(4) for j in range(4)}
+    coords = {"theta_i": theta_i, "theta_s": theta_s, "dphi": dphi}
+    if wavelength is not None:
+        coords["wavelength"] = np.full(len(theta_i), wavelength)
+    return xr.Dataset(rows, {name: ("geometry", value) for name, value in coords.items()})
 
 
 def as_rows(result: "xr.Dataset") -> "xr.Dataset":

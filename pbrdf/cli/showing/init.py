@@ -1,0 +1,156 @@
+"""`pbrdf init`: a scene file to start from."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pbrdf.cli import options
+
+PAINT = """\
+# A glossy paint: random Gaussian surface, polished pigment-free binder over a diffuse base.
+# Lengths in micrometres (_um), angles in degrees (_deg).
+
+[surface]
+type = "gaussian"
+shape = [256, 256]        # cells; the surface repeats beyond them
+spacing_um = 1.0          # a sixteenth of the correlation length or less
+corr_length_um = 16.0     # where the autocorrelation falls to 1/e
+slope_rms = 0.15          # per axis; or height_rms_um
+
+[substrate]
+n = 1.5
+kappa = 0.0
+diffuse_albedo = 0.2      # of the base under the interface
+"""
+
+VINYL = """\
+# Vinyl siding after section 4.2 of Gartley, Brown and Schott: height rms 2.6 um,
+# correlation length 14.5 um, hence slope rms 0.2536.
+
+[surface]
+type = "gaussian"
+shape = [256, 256]
+spacing_um = 0.9
+corr_length_um = 14.5
+height_rms_um = 2.6
+
+[substrate]
+material = "pvc"
+"""
+
+METAL = """\
+# Rough aluminium. Its constants depend on the wavelength: simulate with --wavelength-um.
+
+[surface]
+type = "gaussian"
+shape = [256, 256]
+spacing_um = 1.0
+corr_length_um = 16.0
+slope_rms = 0.3
+
+[substrate]
+material = "aluminium"
+"""
+
+DEW = """\
+# Drops of water on a smooth paint: simulate with --wavelength-um.
+
+[surface]
+type = "gaussian"
+shape = [256, 256]
+spacing_um = 1.0
+corr_length_um = 32.0
+slope_rms = 0.05
+
+[substrate]
+n = 1.5
+
+[[contaminants]]
+type = "drops"
+material = "water"
+contact_angle_deg = 90.0
+volume_per_area_um = 2.0
+number_density_per_mm2 = 500.0
+seed = 1
+"""
+
+FILM = """\
+# A film of water of even thickness on rough glass: simulate with --wavelength-um.
+
+[surface]
+type = "gaussian"
+shape = [256, 256]
+spacing_um = 1.0
+corr_length_um = 24.0
+slope_rms = 0.1
+
+[substrate]
+n = 1.5
+
+[[contaminants]]
+type = "film"
+material = "water"
+thickness_um = 20.0
+"""
+
+MAP = """\
+# A measured height map, traced as it is. heights.npy: heights in micrometres, x first, as
+# numpy.save writes them; other formats are read by `pbrdf statistics`.
+
+[surface]
+type = "height_map"
+file = "heights.npy"
+spacing_um = 0.5
+periodic = false
+
+[substrate]
+n = 1.5
+"""
+
+
+class Kind(StrEnum):
+    """What to start from."""
+
+    paint = "paint"
+    vinyl = "vinyl"
+    metal = "metal"
+    dew = "dew"
+    film = "film"
+    map = "map"
+
+
+TEXTS = {
+    Kind.paint: PAINT,
+    Kind.vinyl: VINYL,
+    Kind.metal: METAL,
+    Kind.dew: DEW,
+    Kind.film: FILM,
+    Kind.map: MAP,
+}
+
+
+def command(
+    file: Annotated[
+        Path, typer.Argument(help="Scene file to write, or - for standard output.")
+    ] = Path("scene.toml"),
+    kind: Annotated[Kind, typer.Option("--kind", help="What to start from.")] = Kind.paint,
+    force: options.Force = False,
+) -> None:
+    """Write a scene file to start from, with a remark on each number.
+
+    Example: pbrdf init paint.toml --kind paint
+    """
+    from pbrdf.cli.staging import staged_file
+
+    text = TEXTS[kind]
+    if str(file) == "-":
+        typer.echo(text, nl=False)
+        return
+    with staged_file(file, force=force) as stage:
+        stage.write_text(text, encoding="utf-8")
+    wave = " --wavelength-um 0.55" if "--wavelength-um" in text else ""
+    typer.echo(f"Written: {file}")
+    typer.echo(f"Next:    pbrdf simulate {file} --theta-i-deg 30,60{wave} -o result.nc")
+    typer.echo("         pbrdf plot result.nc")

@@ -1,0 +1,136 @@
+"""The command line as a shell sees it: help, words, quiet runs, starter scenes."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+
+import data_io
+from pbrdf import Material, MicrofacetModel, load_scene
+from pbrdf.cli import app, main
+from pbrdf.cli.progress import StageBars, Talk, talk
+from pbrdf.cli.showing.init import Kind
+from pbrdf.cli.wording import in_options, options_of
+
+
+@pytest.mark.parametrize("name", app.COMMANDS)
+@pytest.mark.parametrize("flag", ["-h", "--help"])
+def test_every_command_has_help(name, flag, capsys):
+    assert main([name, flag]) == 0
+    text = capsys.readouterr().out
+    assert f"pbrdf {name}" in text
+    # Help says what each option is for
+    assert "Options:" in text
+
+
+def test_every_option_says_what_it_is_for():
+    whole = typer.main.get_command(app.app)
+    silent = [
+        f"{name} {option.opts[0]}"
+        for name, command in whole.commands.items()
+        for option in command.params
+        if not getattr(option, "help", None)
+    ]
+    assert not silent
+
+
+@pytest.mark.parametrize("kind", [kind for kind in Kind if kind is not Kind.map])
+def test_starter_scenes_are_scenes(kind, tmp_path, capsys):
+    path = tmp_path / "scene.toml"
+    assert main(["init", str(path), "--kind", kind.value]) == 0
+    assert "pbrdf simulate" in capsys.readouterr().out
+    scene = load_scene(path)
+    assert bool(scene.contaminants) == (kind in (Kind.dew, Kind.film))
+    # Fine enough for the accuracy that the engine states
+    assert np.min(scene.surface.corr_length) >= 16 * np.max(scene.surface.spacing)
+    assert main(["init", str(path)]) == 2
+    assert "--force" in capsys.readouterr().err
+
+
+def test_a_starter_map_takes_the_heights_beside_it(tmp_path):
+    np.save(tmp_path / "heights.npy", np.random.default_rng(1).standard_normal((20, 30)))
+    assert main(["init", str(tmp_path / "scene.toml"), "--kind", "map"]) == 0
+    assert load_scene(tmp_path / "scene.toml").surface.heights.shape == (20, 30)
+
+
+def test_a_dash_is_standard_output(tmp_path, capsys):
+    assert main(["init", "-", "--kind", "vinyl"]) == 0
+    assert "[substrate]" in capsys.readouterr().out
+    profile = tmp_path / "profile.csv"
+    x = np.arange(300) * 0.5
+    z = np.sin(x / 7) + 0.3 * np.sin(x / 2.3)
+    rows = zip(x, z, strict=True)
+    profile.write_text("x_um,z_um\n" + "".join(f"{a},{b}\n" for a, b in rows))
+    assert main(["--quiet", "statistics", str(profile), "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["slope_rms"]["value"] > 0
+    assert not Path("-").exists()
+
+
+def test_messages_name_options(tmp_path, capsys):
+    np.save(tmp_path / "map.npy", np.zeros((8, 8)))
+    assert main(["statistics", str(tmp_path / "map.npy")]) == 2
+    message = capsys.readouterr().err
+    assert "--spacing-um" in message
+    assert "spacing=" not in message
+
+
+def test_arguments_become_options_and_nothing_else_does():
+    parsed = typer.main.get_command(app.app).commands["simulate"]
+    options = options_of(parsed.params)
+    assert options["source_half_angle"] == "--source-half-angle-deg"
+    assert options["target_rel_error"] == "--target-rel-error"
+    told = in_options("seed must be >= 0, got -1. The seed= of it; theta_i=[1].", options)
+    assert told == "--seed must be >= 0, got -1. The --seed of it; --theta-i-deg [1]."
+    kept = "n-seed=1 is kept, reseed=2 too, and --seed-bank"
+    assert in_options(kept, options) == kept
+
+
+def test_an_angle_beyond_the_horizon_is_refused_in_degrees(tmp_path, capsys):
+    path = tmp_path / "scene.toml"
+    main(["init", str(path)])
+    capsys.readouterr()
+    assert main(["simulate", str(path), "--theta-i-deg", "30,95"]) == 2
+    assert "--theta-i-deg must lie in [0, 90) degrees, got 95" in capsys.readouterr().err
+
+
+def test_a_model_becomes_a_table(tmp_path):
+    model = MicrofacetModel(Material(1.5, 0.2), slope_rms=0.2, diffuse_albedo=0.1)
+    data_io.write_model(model, tmp_path / "model.toml")
+    out = tmp_path / "table.csv"
+    command = [
+        "export",
+        str(tmp_path / "model.toml"),
+        "-o",
+        str(out),
+        "--theta-i-deg",
+        "20",
+    ]
+    assert main(command) == 0
+    scan = data_io.read_goniometer(out)
+    row = scan.isel(geometry=700)
+    expected = model.brdf(row.theta_i.item(), row.theta_s.item(), row.dphi.item())
+    np.testing.assert_allclose(row.M21.item(), expected[2, 1], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(np.degrees(row.theta_i.item()), 20.0)
+
+
+def test_progress_is_a_line_now_and_then_where_there_is_no_terminal(capsys, monkeypatch):
+    monkeypatch.setattr("pbrdf.cli.progress.EVERY", 0.0)
+    with StageBars() as bars:
+        bars.update("tracing", 3, 10)
+        assert capsys.readouterr().err == "tracing: 3 of 10\n"
+        talk(Talk.QUIET)
+        bars.update("tracing", 4, 10)
+        talk(Talk.NORMAL)
+    assert capsys.readouterr().err == ""
+
+
+def test_shell_completion_is_offered():
+    run = subprocess.run(
+        [sys.executable, "-m", "pbrdf", "--show-completion", "bash"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert "complete" in run.stdout.lower() or "complete" in run.stderr.lower()
