@@ -1,6 +1,12 @@
 """Files in and out; units and conventions are converted here and nowhere else."""
 
-from data_io.goniometer import in_plane, read_goniometer, view_angle, write_goniometer
+from data_io.goniometer import (
+    ConventionWarning,
+    in_plane,
+    read_goniometer,
+    view_angle,
+    write_goniometer,
+)
 from data_io.micrograph.read import (
     EdgeProfile,
     MicrographWarning,
@@ -19,6 +25,7 @@ from data_io.topography.profile import Profile, holds_profile, read_profile, wri
 
 __all__ = [
     "ChannelWarning",
+    "ConventionWarning",
     "EdgeProfile",
     "MicrographWarning",
     "MissingUnitWarning",

@@ -171,7 +171,7 @@ def _check_normalisation(scan: Scan) -> None:
                 f"expected an element in 1/sr, at most M00 = {intensity[row]:.6g}, "
                 f"got {scan.values[name][row]:.6g}"
             )
-            cure = "Elements divided by M00 must be multiplied by it."
+            cure = "If the elements are divided by M00, give --normalised."
             raise scan.fault(larger, name, problem, cure)
         impossible = _beyond(scan, name, intensity)
         if impossible.any():

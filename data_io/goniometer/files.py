@@ -1,26 +1,58 @@
 """Reading and writing of goniometer files; which format a file has."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import xarray as xr
 
-from data_io.goniometer import fred, nist, own_csv, spacecraft, zemax
+from data_io.goniometer import astm, fred, nist, own_csv, spacecraft, zemax
 from data_io.goniometer.dataset import to_dataset
+from data_io.goniometer.declared import Declared, declared
+from data_io.goniometer.quantities import as_declared
 from data_io.goniometer.scan import QUANTITIES, Scan
+from data_io.goniometer.write_csv import write_csv
 from data_io.text.text import Line, is_comment, read_lines
 from pbrdf.errors import DataFileError
 
-_READERS: dict[str, Callable[[Path, list[Line]], Scan]] = {
-    "csv": own_csv.read,
-    "fred": fred.read,
-    "zemax": zemax.read,
-    "nist": nist.read,
-    "spacecraft": spacecraft.read,
+
+class _Format(NamedTuple):
+    """A format: its reader, and which declarations it can need."""
+
+    read: Callable[[Path, list[Line], Declared], Scan]
+    takes: tuple[str, ...] = ()
+
+
+_TABLE = ("columns", "azimuth_of_forward", "angles", "normalised")
+_FORMATS = {
+    "csv": _Format(own_csv.read, _TABLE),
+    "astm": _Format(astm.read, _TABLE),
+    "fred": _Format(fred.read, ("azimuth_of_forward",)),
+    "zemax": _Format(lambda path, lines, _: zemax.read(path, lines)),
+    "nist": _Format(lambda path, lines, _: nist.read(path, lines)),
+    "spacecraft": _Format(lambda path, lines, _: spacecraft.read(path, lines)),
+}
+# First words of files that hold a BSDF in a way that is not read
+_FOREIGN = {
+    "<?xml": "a matrix of window software (XML)",
+    "<WindowElement": "a matrix of window software (XML)",
+    "Measurement-DataType": "a LightTools file",
+    "Filetype": "a LightTools file",
 }
 
 
-def read_goniometer(path: str | Path, format: str | None = None) -> xr.Dataset:
+def read_goniometer(  # noqa: PLR0913  (each is a convention that files leave open)
+    path: str | Path,
+    format: str | None = None,
+    *,
+    columns: Mapping[str, str] | str | Path | None = None,
+    azimuth_of_forward: float | None = None,
+    angles: str | None = None,
+    quantity: str | None = None,
+    normalised: bool | None = None,
+    source_half_angle: float | None = None,
+    detector_half_angle: float | None = None,
+) -> xr.Dataset:
     r"""Read a scan of a (polarised) BRDF into the project's conventions.
 
     Parameters
@@ -28,8 +60,25 @@ def read_goniometer(path: str | Path, format: str | None = None) -> xr.Dataset:
     path : str or Path
         The file.
     format : str, optional
-        ``"csv"`` (the project's own), ``"fred"``, ``"zemax"``, ``"nist"`` or
-        ``"spacecraft"``; by default told from the content.
+        ``"csv"`` (the project's own, and other tables with names of columns), ``"astm"``,
+        ``"fred"``, ``"zemax"``, ``"nist"`` or ``"spacecraft"``; by default told from the
+        content.
+    columns : mapping of str to str, or path, optional
+        What columns mean: ``{"AOI": "theta_i_deg", "note": "ignore"}``; or a TOML file with
+        a table ``[columns]`` and the declarations below as keys.
+    azimuth_of_forward : float, optional
+        0 or pi: the azimuth, relative to the source where the file is, at which the
+        specular reflection lies. By default pi, as in the conventions; 0 turns every
+        direction to the other side. [rad]
+    angles : {"deg", "rad"}, optional
+        Unit of all angles of a table, in place of what names say.
+    quantity : {"brdf", "reflectance-factor", "brdf-cos", "relative"}, optional
+        What was measured: dL/dE [1/sr]; pi times it; times cos(theta_s); or with a factor
+        that nobody knows.
+    normalised : bool, optional
+        True: the elements are divided by M00. False: they are not, whatever they look like.
+    source_half_angle, detector_half_angle : float, optional
+        Half-angles of the cones of light, where the file has no column of them. [rad]
 
     Returns
     -------
@@ -63,14 +112,30 @@ def read_goniometer(path: str | Path, format: str | None = None) -> xr.Dataset:
     array([  0., 180.])
     """
     path = Path(path)
-    if format is not None and format not in _READERS:
+    if format is not None and format not in _FORMATS:
         msg = (
-            f"format must be one of {', '.join(_READERS)}, got {format!r}. Or leave it out."
+            f"format must be one of {', '.join(_FORMATS)}, got {format!r}. Or leave it out."
         )
         raise ValueError(msg)
+    said = declared(
+        columns=columns,
+        azimuth_of_forward=azimuth_of_forward,
+        angles=angles,
+        quantity=quantity,
+        normalised=normalised,
+        source_half_angle=source_half_angle,
+        detector_half_angle=detector_half_angle,
+    )
     lines = read_lines(path)
     name = format or _detect(path, lines)
-    return to_dataset(_READERS[name](path, lines))
+    for word in _TABLE:
+        if word not in _FORMATS[name].takes and getattr(said, word) not in (None, {}):
+            msg = (
+                f"{word.replace('_', '-')} does not belong to a {name} file, whose "
+                f"conventions are fixed, got {path.name}. Leave it out."
+            )
+            raise ValueError(msg)
+    return to_dataset(as_declared(_FORMATS[name].read(path, lines, said), said))
 
 
 def write_goniometer(dataset: xr.Dataset, path: str | Path) -> None:
@@ -100,14 +165,15 @@ def write_goniometer(dataset: xr.Dataset, path: str | Path) -> None:
             raise ValueError(msg)
     if not any(name in dataset for name in QUANTITIES):
         msg = (
-            f"dataset must have any of M00..M33, DOLP, got {list(dataset.data_vars)}. "
+            "dataset must have any of M00..M33, m01..m33, DOLP, I_s, I_p, f_ss..f_pp, got "
+            f"{list(dataset.data_vars)}. "
             "Name the measured elements so."
         )
         raise ValueError(msg)
     if dataset.sizes["geometry"] == 0:
         msg = "dataset must have at least one geometry, got none. Check the selection."
         raise ValueError(msg)
-    own_csv.write(dataset, path)
+    write_csv(dataset, path)
 
 
 def _detect(path: Path, lines: list[Line]) -> str:
@@ -117,17 +183,23 @@ def _detect(path: Path, lines: list[Line]) -> str:
     if not content:
         problem = "expected rows of a scan, found comments only"
         raise DataFileError(path, problem, "The file is truncated.")
+    first = content[0].text.strip()
+    for word, what in _FOREIGN.items():
+        if any(line.text.strip().startswith(word) for line in content[:20]):
+            problem = f"expected a goniometer file in a known format, got {what}"
+            cure = f"Export a table; known are {', '.join(_FORMATS)} and .pbsdf."
+            raise DataFileError(path, problem, cure, line=content[0].number)
     candidates = {
         "zemax": zemax.looks_like(content),
         "fred": fred.looks_like(content[0]),
         "nist": nist.looks_like(content[0]),
         "spacecraft": spacecraft.looks_like(comments),
-        "csv": own_csv.looks_like(content[0]) or "," in content[0].text,
+        "astm": astm.looks_like(content),
+        "csv": own_csv.looks_like(content),
     }
     for name, found in candidates.items():
         if found:
             return name
-    first = content[0].text.strip()[:40]
-    problem = f"expected a goniometer file in a known format, got {first!r}"
-    cure = f"Use the project's CSV columns, or give format= ({', '.join(_READERS)})."
+    problem = f"expected a goniometer file in a known format, got {first[:40]!r}"
+    cure = f"Give a table with names of columns, or format= ({', '.join(_FORMATS)})."
     raise DataFileError(path, problem, cure, line=content[0].number)

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from data_io.goniometer.declared import Declared
+from data_io.goniometer.directions import relative_azimuth
 from data_io.goniometer.scan import Scan
 from data_io.text.text import Line, is_number
 from pbrdf.errors import DataFileError
@@ -25,7 +27,7 @@ def looks_like(header: Line) -> bool:
     return header.text.split()[:2] == ["type", "bsdf_data"]
 
 
-def read(path: Path, lines: list[Line]) -> Scan:
+def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     """Read the blocks of a FRED text file."""
     content = [line for line in lines if line.text.strip()]
     options = {"angles": "deg", "bsdf": "value", "scale": "1"}
@@ -55,12 +57,13 @@ def read(path: Path, lines: list[Line]) -> Scan:
     if options["angles"] == "rad":
         angles = [np.degrees(angle) for angle in angles]
     theta_i, phi_i, theta_s, phi_s = angles
+    forward = 0.0 if declared.azimuth_of_forward is None else declared.azimuth_of_forward
     return Scan(
         path=path,
         lines=numbers,
         theta_i=theta_i,
         theta_s=theta_s,
-        dphi=np.mod(phi_s - phi_i + 180.0, 360.0),
+        dphi=relative_azimuth(phi_s, phi_i, forward),
         values={"M00": brdf * float(options["scale"])},
         phi_i=np.mod(phi_i, 360.0) if phi_i.any() else None,
         names={"dphi": "phi_s", "M00": "brdf"},

@@ -26,6 +26,10 @@ CONVENTIONS = (
 )
 
 
+class ConventionWarning(UserWarning):
+    """What a file leaves open was taken in the more likely way."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Scan:
     """Rows of a goniometer file, converted to the conventions but not yet checked.
@@ -47,8 +51,11 @@ class Scan:
         turned under it. [deg]
     source_half_angle, detector_half_angle : ndarray, shape (n,), optional
         Half-angles of the cones of light. [deg]
-    quantity : {"brdf", "relative"}
-        "relative": all but the ratios have one unknown factor in common.
+    quantity : str
+        "brdf", or "relative": all but the ratios have one unknown factor in common; before
+        conversion also "reflectance-factor" and "brdf-cos".
+    declares_quantity : bool
+        The file itself says which.
     names : mapping of str to str
         What the file calls the angles, for messages.
     attrs : mapping
@@ -66,6 +73,7 @@ class Scan:
     source_half_angle: np.ndarray | None = None
     detector_half_angle: np.ndarray | None = None
     quantity: str = "brdf"
+    declares_quantity: bool = False
     names: Mapping[str, str] = field(default_factory=dict)
     attrs: Mapping[str, object] = field(default_factory=dict)
 

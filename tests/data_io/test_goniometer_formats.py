@@ -230,7 +230,7 @@ def test_a_bad_file_names_line_column_and_value(tmp_path, text, message):
 
 
 def test_a_forced_format_is_obeyed(tmp_path):
-    with pytest.raises(DataFileError, match="expected a known column"):
+    with pytest.raises(DataFileError, match="expected known columns"):
         read_goniometer(write(tmp_path, nist_text("0.351,-45,0,30,45")), format="csv")
 
 
