@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from data_io import in_plane, read_goniometer
+from data_io import ConventionWarning, in_plane, read_goniometer
 from pbrdf.errors import DataFileError
 
 FRED = """type bsdf_data
@@ -42,11 +42,11 @@ ScatterRadial\t3
 
 Monochrome
 DataBegin
-TIS\t0.1
+TIS\t6.17
 9\t8\t7
 9\t6\t0
 9\t5\t4
-TIS\t0.2
+TIS\t1.37
 3\t2.5\t2
 3\t2.25\t1
 3\t3.5\t0
@@ -127,6 +127,40 @@ def test_zemax_angles_turn_about_the_specular_ray(tmp_path):
     assert scan.attrs["not_measured"] == int(np.isnan(scan.M00).sum()) == 1
 
 
+def test_zemax_rotations_of_the_sample_stay_apart(tmp_path):
+    turned = ZEMAX.replace("Rotation\t1\n0", "Rotation\t2\n0\t90")
+    begin, end = turned.index("TIS\t6.17"), turned.index("DataEnd")
+    brighter = turned[begin:end].replace("\t8\t", "\t8.5\t")
+    scan = read_goniometer(write(tmp_path, turned[:end] + brighter + turned[end:]))
+    one = read_goniometer(write(tmp_path, ZEMAX))
+    assert "phi_i" not in one.coords
+    assert scan.sizes["geometry"] == 2 * one.sizes["geometry"]
+    assert_array_equal(np.unique(degrees(scan, "phi_i")), [0, 90])
+    lobe = np.isclose(scan.theta_s, np.radians(5)) & np.isclose(
+        scan.theta_i, np.radians(20)
+    )
+    assert_array_equal(scan.M00[lobe], [8, 8.5])
+
+
+def test_zemax_total_scatter_is_compared_with_the_table(tmp_path):
+    # A Lambertian table of albedo 0.6 on a fine grid integrates to it, whatever the incidence
+    radial = np.linspace(0.0, 170.0, 171)
+    azimuth = np.linspace(0.0, 180.0, 91)
+    head, _, tail = ZEMAX.partition("AngleOfIncidence")
+    assert tail
+    rows = "\n".join(" ".join(["0.190985931710274"] * radial.size) for _ in azimuth)
+    text = (
+        f"{head}AngleOfIncidence 1\n40\nScatterAzimuth 91\n{' '.join(map(str, azimuth))}\n"
+        f"ScatterRadial 171\n{' '.join(map(str, radial))}\n\nMonochrome\nDataBegin\n"
+        f"TIS 0.6\n{rows}\nDataEnd\n"
+    )
+    scan = read_goniometer(write(tmp_path, text))
+    assert scan.attrs["tis"] == [0.6]
+    assert_allclose(scan.attrs["tis_of_table"], [0.6], rtol=1e-3)
+    with pytest.warns(ConventionWarning, match=r"3\.14 times the TIS stated .* at 40 deg"):
+        read_goniometer(write(tmp_path, text.replace("0.190985931710274", "0.6")))
+
+
 def test_zemax_sideways_directions_keep_their_distance_from_the_specular_ray(tmp_path):
     scan = read_goniometer(write(tmp_path, ZEMAX))
     scan = scan.isel(geometry=np.flatnonzero(scan.M00.to_numpy() == 2.25))
@@ -205,13 +239,14 @@ def test_nist_placeholders_are_zero(tmp_path):
         (FRED.replace("10 90 0.20", "10 0 0.20"), "line 5, column brdf: expected one value a geometry.*line 4 has 0.5"),
         ("type bsdf_data\nformat angles=deg bsdf=value scale=1\n30 0\n", "found none. The file is truncated"),
         (ZEMAX.replace("9\t6\t0", "9\t6"), "line 20: expected 3 values, one a ScatterRadial, got 2"),
-        (ZEMAX.replace("9\t6\t0\n", ""), "expected 2 x 3 rows, incidence x azimuth, got 5"),
+        (ZEMAX.replace("9\t6\t0\n", ""), "expected 1 x 2 x 3 rows, rotation x incidence x azimuth, got 5"),
         (ZEMAX.replace("9\t6\t0", "9.5\t6\t0"), "line 20, column BRDF: expected one value a geometry"),
         (ZEMAX.replace("9\t6\t0", "9\t6\t-1"), "line 20, column BRDF: expected a value >= 0"),
         (ZEMAX.replace("DataEnd\n", ""), "expected a line DataEnd"),
         (ZEMAX.replace("\tBRDF", "\tBTDF"), "line 6, column ScatterType: expected BRDF, got 'BTDF'"),
         (ZEMAX.replace("Radial\t3", "Radial\t4"), "column ScatterRadial: expected 4 values as announced, got 3"),
-        (ZEMAX.replace("Rotation\t1\n0", "Rotation\t2\n0\t90"), "SampleRotation: expected one rotation, got 2"),
+        (ZEMAX.replace("Rotation\t1\n0", "Rotation\t2\n0\t90"), "expected 2 x 2 x 3 rows, rotation"),
+        (ZEMAX.replace("TIS\t6.17", "TIS x"), "line 18, column TIS: expected a finite number, got 'x'"),
         (SPACECRAFT.replace("3.0e-02", "n/a"), "line 5, column brdf: .*'n/a'"),
         (SPACECRAFT.replace("3.0e-02", "nan"), "line 5, column brdf: expected a number, got nan"),
         (SPACECRAFT.replace("0.00  3.0e-02", ""), "line 5: expected 5 columns as in line 4, got 3"),
