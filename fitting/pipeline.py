@@ -98,6 +98,7 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
     realizations: int = 32,
     seed: int = 0,
     workers: int | None = None,
+    accept: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> PipelineResult:
     """Measure the surface, fit the analytical curve, simulate, fit the simulated curve.
@@ -120,6 +121,8 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
         Readings to leave out, see `fitting.readings.masks`.
     n_rays, realizations, seed, workers
         Of the Monte Carlo, see `pbrdf.simulate`.
+    accept : sequence of str
+        Errors of physics in the scan to go on in spite of, see `fitting.fit`.
     progress : callable, optional
         Called with (stage, steps done, steps in all).
 
@@ -140,11 +143,12 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
         statistics = surface_statistics(surface, form=form)
     free, priors = _slope_knowledge(statistics, free)
 
+    bring = partial(fit, mask=mask, accept=accept)
     start = MicrofacetModel(
         index, slope_rms=statistics.slope_rms.value, shadowing=shadowing
     )
     with clock.stage("analytical fit"):
-        analytic = fit(measurement, start, free=free, priors=priors, mask=mask)
+        analytic = bring(measurement, start, free=free, priors=priors)
 
     simulated = partial(
         _simulated, statistics, measurement, free,
@@ -155,15 +159,15 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
         curve = simulated(analytic.model)
         simulation = curve.simulation(np.unique(measurement.theta_i.values))
     with clock.stage("Monte Carlo fit"):
-        monte_carlo = fit(measurement, curve, free=free, priors=priors, mask=mask)
+        monte_carlo = bring(measurement, curve, free=free, priors=priors)
     scan_slope = None
     if "slope_rms" not in free:
         with clock.stage("slope of the scan"):
             wider = (*free, "slope_rms")
-            scan_slope = fit(measurement, curve, free=wider, mask=mask)
+            scan_slope = bring(measurement, curve, free=wider)
             if abs(scan_slope.values["slope_rms"] / statistics.slope_rms.value - 1.0) > FAR:
                 curve = simulated(scan_slope.model.model)
-                scan_slope = fit(measurement, curve, free=wider, mask=mask)
+                scan_slope = bring(measurement, curve, free=wider)
 
     return PipelineResult(
         statistics=statistics,

@@ -1,6 +1,7 @@
 """Fit a reflectance model to goniometer scans: the one function most users need."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from pbrdf.errors import check_seed
@@ -34,6 +35,7 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     aperture: "Aperture | None" = None,
     search: str | None = None,
     seed: int = 0,
+    accept: Sequence[str] = (),
 ) -> "FitResult":
     """Bring a model to one or several scans and say how well each parameter is known.
 
@@ -81,6 +83,8 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
         Search the whole box of the bounds before the solver polishes.
     seed : int
         Seed of that search.
+    accept : sequence of str
+        Errors of physics to fit in spite of, as `fitting.check_scan` names them, or "all".
 
     Returns
     -------
@@ -92,6 +96,8 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     ------
     ValueError, TypeError
         If an argument does not say what to fit.
+    PhysicsError
+        If a scan contradicts physics as it was read, and this is not accepted.
 
     Examples
     --------
@@ -114,7 +120,8 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     {'specular_gain': 0.9, 'diffuse_albedo': 0.1}
     """
     # Solvers and models load when something is fitted, not when `fitting` is imported
-    from fitting.problem.assembly import Question, assemble
+    from fitting.checks import refuse_errors, remarks
+    from fitting.problem.assembly import Question, assemble, labelled
     from fitting.problem.refinement import solve_through_cones
     from fitting.result.make_result import result_of
 
@@ -134,4 +141,6 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     problems, uncertain = assemble(
         measurement, model, question, use=use, mask=mask, noise=noise
     )
-    return result_of(*solve_through_cones(problems), uncertain)
+    findings = refuse_errors(labelled(measurement), accept)
+    result = result_of(*solve_through_cones(problems), uncertain)
+    return replace(result, warnings=(*result.warnings, *remarks(findings)))

@@ -1,5 +1,7 @@
 """`python -m pbrdf`: the command line."""
 
+import sys
+
 from pbrdf.cli import main
 
-main()
+sys.exit(main())

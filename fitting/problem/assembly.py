@@ -60,7 +60,7 @@ def assemble(
         msg = f"solver must be one of {', '.join(SOLVERS)}, got {question.solver!r}."
         raise ValueError(msg)
     known = _known(question.priors)
-    observations = _above_horizon(observe(_labelled(measurement), use=use, mask=mask))
+    observations = _above_horizon(observe(labelled(measurement), use=use, mask=mask))
     adapter = _adapter(model, question.free)
     free = _with_scale(question, observations)
     outside = {name: value for name, (value, _) in known.items() if name not in free}
@@ -155,7 +155,7 @@ def _with_scales(
     return tuple(started)
 
 
-def _labelled(measurement: Any) -> dict[str, "xr.Dataset"]:
+def labelled(measurement: Any) -> dict[str, "xr.Dataset"]:
     """Give every scan a name."""
     if isinstance(measurement, Mapping) and not hasattr(measurement, "data_vars"):
         scans = {str(label): scan for label, scan in measurement.items()}

@@ -21,6 +21,8 @@ __all__ = [
     "Kappa",
     "Kind",
     "KindOption",
+    "MaterialFile",
+    "OptionalIndex",
     "Output",
     "Rays",
     "Realizations",
@@ -131,9 +133,21 @@ Blocked = Annotated[
 Index = Annotated[
     float, typer.Option("--n", min=0.01, max=1e6, help="Real part of the refractive index.")
 ]
+OptionalIndex = Annotated[
+    float | None,
+    typer.Option("--n", min=0.01, max=1e6, help="Real part of the refractive index."),
+]
 Kappa = Annotated[
     float,
     typer.Option(min=0.0, max=1e3, help="Imaginary part, n + i kappa; positive absorbs."),
+]
+MaterialFile = Annotated[
+    str | None,
+    typer.Option(
+        "--material-file",
+        help="Optical constants in place of --n and --kappa: CSV, YAML, .nk, or "
+        "refractiveindex:shelf/book/page.",
+    ),
 ]
 Wavelength = Annotated[
     float | None,

@@ -11,9 +11,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from data_io import Profile
+    from pbrdf.optics.materials import Material
     from pbrdf.surface.heightmap import HeightMap
 
-__all__ = ["read_scan", "read_surface"]
+__all__ = ["read_material", "read_scan", "read_surface"]
 
 _IMAGES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 _TEXT = {".csv", ".txt", ".asc", ".dat", ".tsv", ".xyz"}
@@ -92,8 +93,15 @@ def _units(text: str | None) -> str | tuple[str, str] | None:
     return words[0], words[1]
 
 
-def read_scan(path: Path, *, wavelength: float | None = None) -> "xr.Dataset":
+def read_scan(
+    path: Path,
+    *,
+    wavelength: float | None = None,
+    declared: Mapping[str, Any] = _NOTHING,
+) -> "xr.Dataset":
     """Read a goniometer file, or those of its rows that have a wavelength [um].
+
+    `declared` holds conventions as `data_io.read_goniometer` takes them.
 
     Raises
     ------
@@ -104,7 +112,7 @@ def read_scan(path: Path, *, wavelength: float | None = None) -> "xr.Dataset":
 
     import data_io
 
-    scan = data_io.read_goniometer(path)
+    scan = data_io.read_goniometer(path, **declared)
     if wavelength is None:
         return scan
     if "wavelength" not in scan.coords:
@@ -119,6 +127,26 @@ def read_scan(path: Path, *, wavelength: float | None = None) -> "xr.Dataset":
         msg = f"--wavelength-um must be one of {known} of {path.name}, got {wavelength:g}."
         raise ValueError(msg)
     return scan.isel(geometry=np.flatnonzero(here))
+
+
+def read_material(
+    n: float | None, kappa: float, file: str | None, *, option: str = "--n"
+) -> "Material | None":
+    """Return the material of --n and --kappa or of --material-file; None without either.
+
+    Raises
+    ------
+    ValueError
+        If both are given, or the file cannot be read.
+    """
+    from pbrdf import Material, materials
+
+    if file is not None:
+        if n is not None or kappa:
+            msg = f"{option} and --kappa come from the --material-file, got both. Drop one."
+            raise ValueError(msg)
+        return materials.read(file)
+    return None if n is None else Material(n, kappa)
 
 
 def _kind(path: Path, columns: str | None, block: int | None) -> Kind:

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pbrdf.cli import options
+from pbrdf.cli import declaring, options
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from fitting.models.simulated import SimulatedModel
     from fitting.result.fit_result import FitResult
-    from pbrdf import MicrofacetModel
+    from pbrdf import Material, MicrofacetModel
 
 
 def command(
@@ -36,6 +36,7 @@ def command(
         ),
     ] = None,
     kappa: options.Kappa = 0.0,
+    material_file: options.MaterialFile = None,
     scene: Annotated[
         Path | None,
         typer.Option(
@@ -54,6 +55,12 @@ def command(
     ] = "",
     shadowing: options.Shadowing = "smith-correlated",
     wavelength: options.Wavelength = None,
+    columns: declaring.ScanColumns = None,
+    azimuth_of_forward: declaring.Forward = None,
+    angles: declaring.Angles = None,
+    quantity: declaring.QuantityOption = None,
+    normalised: declaring.Normalised = None,
+    accept: declaring.Accept = "",
     blocked: options.Blocked = 0.0,
     source_half_angle: Annotated[
         float | None,
@@ -92,16 +99,19 @@ def command(
     Example: pbrdf fit scan.csv --n 1.53 --slope-rms 0.252
     """
     from pbrdf.cli.progress import progress_bar
-    from pbrdf.cli.reading import read_scan
+    from pbrdf.cli.reading import read_material, read_scan
     from pbrdf.cli.staging import staged_folder
 
     cones = {
         "source_half_angle": source_half_angle,
         "detector_half_angle": detector_half_angle,
     }
-    radians = {name: math.radians(v) for name, v in cones.items() if v is not None}
+    declared = declaring.declarations(
+        columns, azimuth_of_forward, angles, quantity, normalised
+    )
+    declared |= {name: math.radians(v) for name, v in cones.items() if v is not None}
     measured = {
-        path.stem: read_scan(path, wavelength=wavelength).assign_coords(radians)
+        path.stem: read_scan(path, wavelength=wavelength, declared=declared)
         for path in scans
     }
     if len(measured) < len(scans):
@@ -114,9 +124,10 @@ def command(
     with progress_bar("tracing") as progress:
         model: MicrofacetModel | SimulatedModel
         if scene is None:
-            model = _analytic(n, kappa, slope_rms, shadowing)
+            material = read_material(n, kappa, material_file)
+            model = _analytic(material, slope_rms, shadowing)
         else:
-            if n is not None or slope_rms is not None:
+            if n is not None or slope_rms is not None or material_file is not None:
                 msg = "--n and --slope-rms come from the --scene, got both. Leave one out."
                 raise ValueError(msg)
             model = _simulated(
@@ -138,6 +149,7 @@ def command(
             separate=options.names(separate),
             mask=(zeros(), blocked_detector(blocked)) if blocked else (zeros(),),
             loss=loss,
+            accept=options.names(accept),
         )
     if output is not None:
         with staged_folder(output, force=force) as stage:
@@ -148,16 +160,16 @@ def command(
 
 
 def _analytic(
-    n: float | None, kappa: float, slope_rms: float | None, shadowing: str
+    material: "Material | None", slope_rms: float | None, shadowing: str
 ) -> "MicrofacetModel":
     """Return the analytical model to start from."""
-    from pbrdf import Material, MicrofacetModel
+    from pbrdf import MicrofacetModel
 
-    if n is None or slope_rms is None:
-        option = "--n" if n is None else "--slope-rms"
+    if material is None or slope_rms is None:
+        option = "--n" if material is None else "--slope-rms"
         msg = f"{option} must be given, got none. Or give a --scene, which has both."
         raise ValueError(msg)
-    return MicrofacetModel(Material(n, kappa), slope_rms=slope_rms, shadowing=shadowing)
+    return MicrofacetModel(material, slope_rms=slope_rms, shadowing=shadowing)
 
 
 def _simulated(

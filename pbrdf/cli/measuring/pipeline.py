@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from pbrdf.cli import options
+from pbrdf.cli import declaring, options
 from pbrdf.cli.options import Kind
 
 if TYPE_CHECKING:
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 def command(
     surface: options.Surface,
     scan: options.Scan,
-    n: options.Index,
+    n: options.OptionalIndex = None,
     kappa: options.Kappa = 0.0,
+    material_file: options.MaterialFile = None,
     output: options.Output = None,
     force: options.Force = False,
     kind: options.KindOption = Kind.auto,
@@ -31,6 +32,12 @@ def command(
     block: options.Block = None,
     form: options.FormOption = "tilt",
     wavelength: options.Wavelength = None,
+    scan_columns: declaring.PipelineScanColumns = None,
+    azimuth_of_forward: declaring.Forward = None,
+    angles: declaring.Angles = None,
+    quantity: declaring.QuantityOption = None,
+    normalised: declaring.Normalised = None,
+    accept: declaring.Accept = "",
     free: options.Free = "specular_gain,diffuse_albedo",
     shadowing: options.Shadowing = "smith-correlated",
     blocked: options.Blocked = 0.0,
@@ -47,13 +54,23 @@ def command(
     Example: pbrdf pipeline edge.png scan.csv --um-per-pixel 0.5 --n 1.53
     """
     begin = perf_counter()
-    from pbrdf import Material
     from pbrdf.cli.progress import StageBars
-    from pbrdf.cli.reading import read_scan, read_surface
+    from pbrdf.cli.reading import read_material, read_scan, read_surface
     from pbrdf.cli.staging import staged_folder
 
     target = output or Path(f"{scan.stem}-model")
-    material = Material(n, kappa)
+    material = read_material(n, kappa, material_file)
+    if material is None:
+        msg = "--n must be given, got none. Or give a --material-file."
+        raise ValueError(msg)
+    declared = declaring.declarations(
+        scan_columns,
+        azimuth_of_forward,
+        angles,
+        quantity,
+        normalised,
+        option="--scan-columns",
+    )
     with ExitStack() as stack:
         # A target that may not be written is refused before the work, not after
         stage = stack.enter_context(staged_folder(target, force=force))
@@ -61,7 +78,7 @@ def command(
             surface, kind=kind, um_per_pixel=um_per_pixel, spacing=spacing, unit=unit,
             channel=channel, columns=columns, block=block,
         )  # fmt: skip
-        measurement = read_scan(scan, wavelength=wavelength)
+        measurement = read_scan(scan, wavelength=wavelength, declared=declared)
         reading = perf_counter() - begin
 
         from fitting.pipeline import run_pipeline
@@ -81,12 +98,13 @@ def command(
             realizations=realizations,
             seed=seed,
             workers=workers,
+            accept=options.names(accept),
             progress=bars.update,
         )
         inputs = {
             "surface": surface.name,
             "scan": scan.name,
-            "index": f"{n:g} + {kappa:g} i",
+            "index": material_file or f"{n:g} + {kappa:g} i",
             "fitted": free,
         }
         begin = perf_counter()

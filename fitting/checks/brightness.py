@@ -1,0 +1,113 @@
+"""Brightness of a scan by incidence: M00 from whatever was read, and its error."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Curve", "brightness", "curves", "noise_of"]
+
+# sin(theta_s) |sin(dphi)| of a reading that counts as in plane
+_PLANE = 2e-3
+# Second differences of independent readings have six times their variance; and the median
+# of the size of a normal number is 0.6745 standard deviations
+_SECOND, _MEDIAN = np.sqrt(6.0), 0.6745
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Readings of one incidence, azimuth of the source and wavelength.
+
+    Attributes
+    ----------
+    theta_i, wavelength : float
+        [rad], [um]; wavelength NaN where unknown.
+    theta_s, dphi, value, stderr : ndarray, shape (n,)
+        [rad], [rad], [1/sr], [1/sr]; stderr NaN where unknown.
+    """
+
+    theta_i: float
+    wavelength: float
+    theta_s: np.ndarray
+    dphi: np.ndarray
+    value: np.ndarray
+    stderr: np.ndarray
+
+    @property
+    def place(self) -> str:
+        """The incidence and wavelength in words."""
+        wave = "" if np.isnan(self.wavelength) else f", {self.wavelength:g} um"
+        return f"incidence {np.degrees(self.theta_i):.4g} deg{wave}"
+
+    def in_plane(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return rising signed view angles, values and errors of the plane of incidence."""
+        inside = np.abs(np.sin(self.dphi)) * np.sin(self.theta_s) < _PLANE
+        view = np.where(np.cos(self.dphi) > 0, -self.theta_s, self.theta_s)[inside]
+        order = np.argsort(view, kind="stable")
+        return view[order], self.value[inside][order], self.stderr[inside][order]
+
+    @property
+    def is_planar(self) -> bool:
+        """True if nothing was read out of the plane of incidence."""
+        return bool((np.abs(np.sin(self.dphi)) * np.sin(self.theta_s) < _PLANE).all())
+
+
+def brightness(scan: "xr.Dataset") -> tuple[np.ndarray, np.ndarray] | None:
+    """Return M00 and its standard error, or None where the scan has none.
+
+    The sum of light behind two crossed polarisers is M00, that of four half-polarised
+    readings f_ab twice M00.
+    """
+    size = scan.sizes["geometry"]
+    for parts, factor in (
+        (("M00",), 1.0), (("I_s", "I_p"), 1.0), (("f_ss", "f_sp", "f_ps", "f_pp"), 0.5),
+    ):  # fmt: skip
+        if set(parts) <= set(scan.data_vars):
+            value = factor * sum(np.asarray(scan[part].values, float) for part in parts)
+            errors = [
+                np.asarray(scan[f"{part}_stderr"].values, float)
+                if f"{part}_stderr" in scan
+                else np.full(size, np.nan)
+                for part in parts
+            ]
+            return np.asarray(value), factor * np.sqrt(sum(e**2 for e in errors))
+    return None
+
+
+def curves(scan: "xr.Dataset") -> Iterator[Curve]:
+    """Yield the readings of each incidence, azimuth of the source and wavelength."""
+    found = brightness(scan)
+    if found is None:
+        return
+    size = scan.sizes["geometry"]
+
+    def column(name: str, default: float) -> np.ndarray:
+        if name not in scan.coords:
+            return np.full(size, default)
+        return np.broadcast_to(np.asarray(scan[name].values, float), (size,))
+
+    theta_i, wavelength = column("theta_i", np.nan), column("wavelength", np.nan)
+    keys = np.column_stack([
+        np.rint(theta_i * 1e6), np.rint(column("phi_i", 0.0) * 1e6),
+        np.rint(np.nan_to_num(wavelength, nan=-1.0) * 1e9),
+    ])  # fmt: skip
+    value, stderr = found
+    theta_s, dphi = column("theta_s", np.nan), column("dphi", np.nan)
+    for key in np.unique(keys, axis=0):
+        here = (keys == key).all(axis=1) & np.isfinite(value)
+        if here.any():
+            yield Curve(
+                float(theta_i[here][0]), float(wavelength[here][0]),
+                theta_s[here], dphi[here], value[here], stderr[here],
+            )  # fmt: skip
+
+
+def noise_of(values: np.ndarray) -> float:
+    """Return the scatter of even readings about a smooth curve, NaN of fewer than 8."""
+    if values.size < 8:
+        return float("nan")
+    return float(np.median(np.abs(np.diff(values, n=2)))) / (_SECOND * _MEDIAN)

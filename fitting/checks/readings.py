@@ -1,0 +1,242 @@
+"""Single readings: polarisation, limits of the instrument, noise, repeats, wavelengths."""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fitting.checks.brightness import Curve, brightness, noise_of
+from fitting.checks.finding import Finding
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "check_limits", "check_noise", "check_polarisation", "check_repeats",
+    "check_wavelengths",
+]  # fmt: skip
+
+_REPEATS = 3
+
+
+def check_polarisation(scan: "xr.Dataset") -> list[Finding]:
+    """No surface polarises more light than it reflects."""
+    found = brightness(scan)
+    findings = []
+    for i in range(4):
+        for j in range(4):
+            name = f"M{i}{j}"
+            if found is None or name == "M00" or name not in scan:
+                continue
+            value, stderr = np.asarray(scan[name].values, float), _stderr(scan, name)
+            error = np.hypot(np.nan_to_num(stderr), np.nan_to_num(found[1]))
+            margin = np.where(
+                error > 0, 5.0 * error, 0.02 * np.nanmax(found[0], initial=0.0)
+            )
+            beyond = np.abs(value) > np.abs(found[0]) + margin
+            if beyond.any():
+                row = int(np.argmax(np.abs(value) - np.abs(found[0])))
+                findings.append(
+                    Finding(
+                        name="polarisation", severity="error",
+                        what=f"{name} exceeds M00 in {beyond.sum()} readings, at worst "
+                        f"{value[row]:.4g} beside {found[0][row]:.4g} at "
+                        f"{_place(scan, row)}",
+                        suspects="elements divided by M00, or columns exchanged",
+                        cure="Give --normalised if they are divided by M00; or "
+                        "--accept polarisation.",
+                    )
+                )  # fmt: skip
+    return findings + _biased_dolp(scan)
+
+
+def _biased_dolp(scan: "xr.Dataset") -> list[Finding]:
+    """Say by how much noise lifts a degree of polarisation, which cannot be negative.
+
+    For Q and U of error s the mean of sqrt(Q^2 + U^2)/I at polarisation p is about
+    p + s^2 / (2 p), and 1.25 s at none.
+    """
+    if "DOLP" not in scan or "DOLP_stderr" not in scan:
+        return []
+    value, stderr = np.asarray(scan["DOLP"].values, float), _stderr(scan, "DOLP")
+    weak = (value < 3.0 * stderr) & np.isfinite(value)
+    if not weak.any():
+        return []
+    true = np.sqrt(np.maximum(value**2 - stderr**2, 0.0))
+    bias = float(np.median((value - true)[weak]))
+    return [
+        Finding(
+            name="dolp", severity="warning",
+            what=f"{weak.sum()} of {np.isfinite(value).sum()} readings of DOLP lie within "
+            f"three standard errors of zero, where noise lifts them, by about {bias:.2g}",
+            suspects="a degree of polarisation computed from noisy Q and U",
+            cure="Give signed Q/I (column m10) in place of DOLP: it has no such bias.",
+        )
+    ]  # fmt: skip
+
+
+def check_limits(curves: Sequence[Curve]) -> list[Finding]:
+    """Look for a ceiling and a floor: the same extreme number several times."""
+    findings = []
+    ceilings = [
+        curve
+        for curve in curves
+        if _repeated(curve, np.max) and curve.value.max() > 1.2 * np.median(curve.value)
+    ]
+    if ceilings:
+        curve = ceilings[0]
+        findings.append(
+            Finding(
+                name="saturation", severity="warning",
+                what=f"{_repeated(curve, np.max)} readings have the highest value, "
+                f"{curve.value.max():.6g}, at {curve.place}",
+                suspects="a saturated detector", cure="Leave them out: saturated(limit) of "
+                "fitting.readings.masks, or empty cells.",
+            )
+        )  # fmt: skip
+    # Far below the peak: a diffuse sample has flat wings too
+    floors = [
+        curve
+        for curve in curves
+        if _repeated(curve, np.min) and curve.value.min() < 0.05 * curve.value.max()
+    ]
+    if floors:
+        curve = floors[0]
+        bottom = curve.value.min()
+        what = "exactly 0" if bottom == 0 else f"the lowest value, {bottom:.6g}"
+        findings.append(
+            Finding(
+                name="floor", severity="warning",
+                what=f"{_repeated(curve, np.min)} readings have {what}, at {curve.place}",
+                suspects="the floor of the instrument, or places that were not measured",
+                cure="Leave these cells empty; exact zeros are left out by the commands.",
+            )
+        )  # fmt: skip
+    values = np.concatenate([curve.value for curve in curves])
+    negative = int((values < 0).sum())
+    if negative:
+        findings.append(
+            Finding(
+                name="negative", severity="note",
+                what=f"{negative} readings lie below zero, down to {values.min():.4g}; "
+                "they are kept: leaving them out would lift the albedo",
+            )
+        )  # fmt: skip
+    return findings
+
+
+def _repeated(curve: Curve, extreme: Callable[[np.ndarray], float]) -> int:
+    """Return how often the extreme value occurs, or 0 where that is by chance."""
+    count = int((curve.value == extreme(curve.value)).sum())
+    return count if count >= _REPEATS else 0
+
+
+def check_noise(curves: Sequence[Curve]) -> list[Finding]:
+    """Compare the scatter about a smooth curve with the stated errors."""
+    scatter, stated, level = [], [], []
+    for curve in curves:
+        view, value, stderr = curve.in_plane()
+        steps = np.diff(view)
+        if view.size < 12 or np.ptp(steps) > 0.05 * steps.mean():
+            continue
+        # Only where the curve is flat do second differences see noise alone
+        scatter.append(noise_of(value[value <= np.median(value)]))
+        stated.append(float(np.median(stderr[value <= np.median(value)])))
+        level.append(float(np.median(value)))
+    if not scatter or not np.median(level) > 0:
+        return []
+    noise, error, middle = (float(np.median(part)) for part in (scatter, stated, level))
+    if not np.isfinite(noise):
+        return []
+    if np.isfinite(error) and error > 0 and noise > 3.0 * error:
+        return [
+            Finding(
+                name="noise", severity="warning",
+                what=f"neighbouring readings scatter by {noise:.3g} 1/sr, "
+                f"{noise / error:.3g} times the stated errors",
+                suspects="errors of the mean where those of a reading are meant, or drift",
+                cure="Let the fit estimate the noise: leave the column of errors out.",
+            )
+        ]  # fmt: skip
+    return [
+        Finding(
+            name="noise", severity="note",
+            what=f"neighbouring readings scatter by at most {noise / middle:.2g} of the "
+            "middle of each curve",
+        )
+    ]  # fmt: skip
+
+
+def check_repeats(scan: "xr.Dataset") -> list[Finding]:
+    """Count geometries that stand more than once."""
+    names = [
+        n for n in ("theta_i", "theta_s", "dphi", "phi_i", "wavelength") if n in scan.coords
+    ]
+    size = scan.sizes["geometry"]
+    columns = [np.broadcast_to(np.asarray(scan[n].values, float), (size,)) for n in names]
+    keys = np.rint(np.nan_to_num(np.column_stack(columns)) * 1e7)
+    repeats = size - len(np.unique(keys, axis=0))
+    if not repeats:
+        return []
+    return [
+        Finding(
+            name="duplicates", severity="warning",
+            what=f"{repeats} readings repeat a geometry",
+            suspects="repeated measurements, or a file joined twice",
+            cure="Average repeats into one row with its standard error.",
+        )
+    ]  # fmt: skip
+
+
+def check_wavelengths(scan: "xr.Dataset") -> list[Finding]:
+    """Say how many wavelengths there are, and that a relative scan has no scale."""
+    findings = []
+    if "wavelength" in scan.coords:
+        waves = np.unique(np.asarray(scan["wavelength"].values, float).round(9))
+        if waves.size > 1:
+            findings.append(
+                Finding(
+                    name="wavelengths", severity="note",
+                    what=f"{waves.size} wavelengths, {waves.min():g} to {waves.max():g} um",
+                    cure="Each has an albedo of its own; --wavelength-um takes one.",
+                )
+            )  # fmt: skip
+    if scan.attrs.get("quantity") == "relative" or brightness(scan) is None:
+        findings.append(
+            Finding(
+                name="scale", severity="note",
+                what="the readings have no absolute scale: no albedo or gain follows from "
+                "them, but ratios",
+            )
+        )  # fmt: skip
+    stated, own = scan.attrs.get("tis"), scan.attrs.get("tis_of_table")
+    if stated is not None and own is not None:
+        ratio = np.atleast_1d(own) / np.maximum(np.atleast_1d(stated), 1e-300)
+        if (np.abs(ratio - 1.0) > 0.25).any():
+            worst = ratio[np.argmax(np.abs(np.log(np.maximum(ratio, 1e-9))))]
+            findings.append(
+                Finding(
+                    name="tis", severity="warning",
+                    what=f"the table integrates to {worst:.3g} times the total scatter "
+                    "that the file states",
+                    suspects="a TIS without the cosine or of half the space, or a scaled "
+                    "table",
+                    cure="Compare with a measured total reflectance.",
+                )
+            )  # fmt: skip
+    return findings
+
+
+def _stderr(scan: "xr.Dataset", name: str) -> np.ndarray:
+    column = f"{name}_stderr"
+    size = scan.sizes["geometry"]
+    return (
+        np.asarray(scan[column].values, float) if column in scan else np.full(size, np.nan)
+    )
+
+
+def _place(scan: "xr.Dataset", row: int) -> str:
+    angles = (
+        np.degrees(float(scan[n].values[row])) for n in ("theta_i", "theta_s", "dphi")
+    )
+    return "theta_i {:.4g}, theta_s {:.4g}, dphi {:.4g} deg".format(*angles)
