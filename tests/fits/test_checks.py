@@ -1,0 +1,163 @@
+"""What a look at a scan finds: each slip with its option, and nothing in good scans."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from numpy.testing import assert_allclose
+
+from data_io import read_goniometer
+from fitting import PhysicsError, check_scan, fit
+from fitting.checks.brightness import curves
+from fitting.checks.energy import reflectance_bounds
+from pbrdf import Material, MicrofacetModel
+from pbrdf.cli import main
+
+CASES = Path(__file__).parents[1] / "cases/optics"
+MODEL = MicrofacetModel(
+    Material(1.5), slope_rms=0.25, specular_gain=0.9, diffuse_albedo=0.4
+)
+
+
+def scan_of(model=MODEL, incidences=(30, 60), views=None, **more):
+    """A scan in the plane of incidence, exact."""
+    views = np.arange(-75, 76, 5) if views is None else views
+    theta_i, view = (
+        a.ravel() for a in np.meshgrid(np.radians(incidences), np.radians(views))
+    )
+    dphi = np.where(view > 0, np.pi, 0.0)
+    brdf = model.brdf(theta_i, np.abs(view), dphi)
+    data = {"M00": brdf[:, 0, 0], "M10": brdf[:, 1, 0]}
+    coords = {"theta_i": theta_i, "theta_s": np.abs(view), "dphi": dphi} | more
+    return xr.Dataset(
+        {name: ("geometry", values) for name, values in data.items()},
+        {name: ("geometry", values) for name, values in coords.items()},
+    )
+
+
+def names(scan, severity=("error", "warning")):
+    return {finding.name for finding in check_scan(scan) if finding.severity in severity}
+
+
+@pytest.mark.parametrize("slope", [0.05, 0.25, 0.5])
+@pytest.mark.parametrize("albedo", [0.0, 0.4])
+def test_a_good_scan_gives_no_error(slope, albedo):
+    model = MicrofacetModel(Material(1.5), slope_rms=slope, diffuse_albedo=albedo)
+    assert names(scan_of(model), ("error",)) == set()
+
+
+def test_exchanged_sides_are_an_error_that_names_the_option():
+    turned = scan_of()
+    turned = turned.assign_coords(dphi=np.pi - turned.dphi)
+    error = check_scan(turned)[0]
+    assert (error.name, error.severity) == ("exchanged", "error")
+    assert "--azimuth-of-forward 0" in error.cure
+    with pytest.raises(PhysicsError, match=r"\[exchanged\].*--azimuth-of-forward 0"):
+        fit(turned, MODEL)
+    result = fit(turned, MODEL, accept=("exchanged",))
+    assert any("brighter than the forward side" in warning for warning in result.warnings)
+    with pytest.raises(ValueError, match="accept must name any of exchanged"):
+        fit(turned, MODEL, accept=("everything",))
+
+
+@pytest.mark.parametrize(
+    ("factor", "option"), [(np.pi, "reflectance-factor"), (1000.0, "--quantity relative")]
+)
+def test_more_light_than_came(factor, option):
+    bright = MicrofacetModel(Material(1.5), slope_rms=0.25, diffuse_albedo=0.9)
+    scan = scan_of(bright)
+    scan = scan.assign(M00=factor * scan.M00, M10=factor * scan.M10)
+    error = check_scan(scan)[0]
+    assert (error.name, error.severity) == ("energy", "error")
+    assert option in error.cure
+    assert "energy" not in names(scan.assign_attrs(quantity="relative"))
+
+
+def test_bounds_of_the_reflectance_hold_a_known_one():
+    # A Lambertian sample of albedo 0.6, in plane and over the hemisphere
+    for out_of_plane in (False, True):
+        theta_s = np.radians(np.arange(0, 90, 5.0))
+        dphi = np.radians(np.arange(0, 360, 20.0)) if out_of_plane else np.array([0, np.pi])
+        zenith, turn = (a.ravel() for a in np.meshgrid(theta_s, dphi))
+        scan = xr.Dataset(
+            {"M00": ("geometry", np.full(zenith.size, 0.6 / np.pi))},
+            {
+                "theta_i": ("geometry", np.full(zenith.size, 0.7)),
+                "theta_s": ("geometry", zenith),
+                "dphi": ("geometry", turn),
+            },
+        )
+        (curve,) = curves(scan)
+        low, middle = reflectance_bounds(curve)
+        assert low <= 0.6 * (1 + 1e-6)
+        assert_allclose(middle, 0.6, rtol=0.02 if out_of_plane else 0.15)
+
+
+def test_polarisation_beyond_the_light():
+    scan = scan_of()
+    scan = scan.assign(M10=scan.M10.copy(data=scan.M10.values + 0.01 + scan.M00.values))
+    error = check_scan(scan)[0]
+    assert (error.name, error.severity) == ("polarisation", "error")
+    assert "M10 exceeds M00" in error.what
+
+
+def test_a_cosine_breaks_reciprocity_as_itself():
+    scan = scan_of(incidences=(15, 30, 45, 60))
+    assert "reciprocity" not in names(scan)
+    error = check_scan(scan * np.cos(scan.theta_s))[0]
+    assert (error.name, error.severity) == ("reciprocity", "error")
+    assert "--quantity brdf-cos" in error.cure
+
+
+def test_limits_of_the_instrument_repeats_and_noise():
+    scan = scan_of(
+        MicrofacetModel(Material(1.5), slope_rms=0.15), views=np.arange(-75, 76, 2.5)
+    )
+    clipped = scan.assign(M00=scan.M00.clip(max=0.7 * float(scan.M00.max())))
+    assert "saturation" in names(clipped) - names(scan)
+    floored = scan.assign(M00=scan.M00.clip(min=0.02 * float(scan.M00.max())))
+    assert "floor" in names(floored)
+    assert "duplicates" in names(xr.concat([scan, scan], "geometry")) - names(scan)
+    rng = np.random.default_rng(3)
+    flat = scan_of(views=np.arange(-75, 76, 2.0))
+    noisy = flat.assign(
+        M00=flat.M00 + xr.DataArray(rng.normal(0.0, 0.004, flat.M00.size), dims="geometry"),
+        M00_stderr=("geometry", np.full(flat.sizes["geometry"], 0.0004)),
+    )
+    assert "noise" in names(noisy)
+    assert "noise" not in names(noisy.assign(M00_stderr=10 * noisy.M00_stderr))
+
+
+def test_a_weak_dolp_is_said_to_be_lifted_by_noise():
+    scan = scan_of().drop_vars("M10")
+    rng = np.random.default_rng(8)
+    size = scan.sizes["geometry"]
+    dolp = np.hypot(0.01 + rng.normal(0, 0.02, size), rng.normal(0, 0.02, size))
+    scan = scan.assign(
+        DOLP=("geometry", dolp), DOLP_stderr=("geometry", np.full(size, 0.02))
+    )
+    (finding,) = [f for f in check_scan(scan) if f.name == "dolp"]
+    assert "signed Q/I" in finding.cure
+
+
+def test_the_command_exits_by_what_it_finds(capsys):
+    assert main(["check", str(CASES / "good.csv")]) == 0
+    assert "Nothing contradicts physics" in capsys.readouterr().out
+    assert main(["check", str(CASES / "flipped.csv")]) == 1
+    assert "[exchanged]" in capsys.readouterr().out
+    assert main(["check", str(CASES / "flipped.csv"), "--azimuth-of-forward", "0"]) == 0
+    fitted = ["fit", str(CASES / "flipped.csv"), "--n", "1.5", "--slope-rms", "0.25"]
+    assert main(fitted) == 2
+    assert "--azimuth-of-forward 0" in capsys.readouterr().err
+    assert main([*fitted, "--azimuth-of-forward", "0"]) == 0
+    assert "0.8999" in capsys.readouterr().out
+
+
+def test_declared_cases_are_fitted_to_their_truth():
+    factor = read_goniometer(CASES / "factor_pi_dark.csv", quantity="reflectance-factor")
+    result = fit(factor, MODEL)
+    assert_allclose(result.values["specular_gain"], 0.3, rtol=1e-5)
+    assert_allclose(result.values["diffuse_albedo"], 0.05, rtol=1e-5)
+    noisy = fit(read_goniometer(CASES / "negative_noise.csv"), MODEL)
+    assert noisy.estimates["diffuse_albedo"].low == 0.0
