@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from data_io.goniometer.declared import Declared
-from data_io.goniometer.names import POLARISERS, STOKES
 from data_io.goniometer.scan import (
     ELEMENTS,
     INTENSITIES,
@@ -16,6 +15,7 @@ from data_io.goniometer.scan import (
     ConventionWarning,
     Scan,
 )
+from data_io.goniometer.tables.names import POLARISERS, STOKES
 
 __all__ = ["as_declared", "mueller_elements"]
 

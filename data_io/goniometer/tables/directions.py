@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io.goniometer.columns import Columns
 from data_io.goniometer.declared import Declared
+from data_io.goniometer.tables.columns import Columns
 from pbrdf.errors import DataFileError
 
 __all__ = ["directions", "relative_azimuth"]

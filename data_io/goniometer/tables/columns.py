@@ -11,9 +11,16 @@ import numpy as np
 import pandas as pd
 
 from data_io.goniometer.declared import Declared
-from data_io.goniometer.names import ANGLES, IGNORE, TARGETS, Meaning, meaning_of, target_of
 from data_io.goniometer.scan import STDERR, ConventionWarning
-from data_io.goniometer.table import RawTable
+from data_io.goniometer.tables.names import (
+    ANGLES,
+    IGNORE,
+    TARGETS,
+    Meaning,
+    meaning_of,
+    target_of,
+)
+from data_io.goniometer.tables.table import RawTable
 from pbrdf.errors import DataFileError
 from pbrdf.optics.published.columns import Column
 

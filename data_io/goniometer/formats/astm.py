@@ -8,10 +8,10 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from data_io.goniometer import own_csv
 from data_io.goniometer.declared import Declared
-from data_io.goniometer.names import ANGLES, meaning_of
 from data_io.goniometer.scan import Scan
+from data_io.goniometer.tables import own_csv
+from data_io.goniometer.tables.names import ANGLES, meaning_of
 from data_io.text.text import Line, is_number
 from pbrdf.errors import DataFileError
 

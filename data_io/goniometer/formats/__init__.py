@@ -1,0 +1,1 @@
+"""Formats of others, each module with `looks_like` and `read`."""

@@ -1,0 +1,1 @@
+"""Tables with names of columns: cells, meanings, directions, quantities."""
