@@ -7,12 +7,12 @@ from typing import NamedTuple
 import xarray as xr
 
 from data_io.goniometer.dataset import to_dataset
-from data_io.goniometer.declared import Declared, declared
+from data_io.goniometer.declarations import Declared, declared
 from data_io.goniometer.formats import astm, fred, nist, spacecraft, zemax
 from data_io.goniometer.scan import QUANTITIES, Scan
 from data_io.goniometer.tables import own_csv
 from data_io.goniometer.tables.quantities import as_declared
-from data_io.goniometer.tables.write_csv import write_csv
+from data_io.goniometer.tables.writing import write_csv
 from data_io.text.text import Line, is_comment, read_lines
 from pbrdf.errors import DataFileError
 

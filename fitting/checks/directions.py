@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fitting.checks.brightness import Curve
+from fitting.checks.curves import Curve
 from fitting.checks.finding import Finding
 
 __all__ = ["check_exchange", "check_reciprocity"]

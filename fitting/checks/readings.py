@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fitting.checks.brightness import Curve, brightness, noise_of
+from fitting.checks.curves import Curve, brightness, noise_of
 from fitting.checks.finding import Finding
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from fitting.checks.brightness import curves
+from fitting.checks.curves import curves_of
 from fitting.checks.directions import check_exchange, check_reciprocity
 from fitting.checks.energy import check_energy
 from fitting.checks.finding import Finding, PhysicsError
@@ -50,7 +50,7 @@ def check_scan(scan: "xr.Dataset") -> list[Finding]:
     >>> print(check_scan(xr.Dataset({"M00": ("geometry", lobe)}, coords))[0].name)
     exchanged
     """
-    readings = list(curves(scan))
+    readings = list(curves_of(scan))
     findings = [*check_wavelengths(scan), *check_repeats(scan), *check_polarisation(scan)]
     if readings:
         findings += [*check_exchange(readings), *check_reciprocity(readings)]

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from data_io import read_goniometer
 from fitting import PhysicsError, check_scan, fit
-from fitting.checks.brightness import curves
+from fitting.checks.curves import curves_of
 from fitting.checks.energy import reflectance_bounds
 from pbrdf import Material, MicrofacetModel
 from pbrdf.cli import main
@@ -88,7 +88,7 @@ def test_bounds_of_the_reflectance_hold_a_known_one():
                 "dphi": ("geometry", turn),
             },
         )
-        (curve,) = curves(scan)
+        (curve,) = curves_of(scan)
         low, middle = reflectance_bounds(curve)
         assert low <= 0.6 * (1 + 1e-6)
         assert_allclose(middle, 0.6, rtol=0.02 if out_of_plane else 0.15)

@@ -8,7 +8,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from data_io.goniometer.declared import Declared
+from data_io.goniometer.declarations import Declared
 from data_io.goniometer.scan import Scan
 from data_io.goniometer.tables import own_csv
 from data_io.goniometer.tables.names import ANGLES, meaning_of

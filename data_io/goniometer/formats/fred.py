@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io.goniometer.declared import Declared
+from data_io.goniometer.declarations import Declared
 from data_io.goniometer.scan import Scan
-from data_io.goniometer.tables.directions import relative_azimuth
+from data_io.goniometer.tables.angles import relative_azimuth
 from data_io.text.text import Line, is_number
 from pbrdf.errors import DataFileError
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from data_io.goniometer.declared import Declared
+from data_io.goniometer.declarations import Declared
 from data_io.goniometer.scan import STDERR, ConventionWarning
 from data_io.goniometer.tables.names import (
     ANGLES,

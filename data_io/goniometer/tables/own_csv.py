@@ -4,14 +4,14 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from data_io.goniometer.declared import QUANTITY_NAMES, Declared
+from data_io.goniometer.declarations import QUANTITY_NAMES, Declared
 from data_io.goniometer.scan import STDERR, Scan
+from data_io.goniometer.tables.angles import directions
 from data_io.goniometer.tables.columns import read_columns
-from data_io.goniometer.tables.directions import directions
 from data_io.goniometer.tables.names import meaning_of
 from data_io.goniometer.tables.quantities import mueller_elements
 from data_io.goniometer.tables.table import read_table
-from data_io.goniometer.tables.write_csv import NOTES
+from data_io.goniometer.tables.writing import NOTES
 from data_io.text.text import Line
 from pbrdf.errors import DataFileError
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from data_io.goniometer.declared import Declared
+from data_io.goniometer.declarations import Declared
 from data_io.goniometer.scan import (
     ELEMENTS,
     INTENSITIES,

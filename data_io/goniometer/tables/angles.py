@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io.goniometer.declared import Declared
+from data_io.goniometer.declarations import Declared
 from data_io.goniometer.tables.columns import Columns
 from pbrdf.errors import DataFileError
 

@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Curve", "brightness", "curves", "noise_of"]
+__all__ = ["Curve", "brightness", "curves_of", "noise_of"]
 
 # sin(theta_s) |sin(dphi)| of a reading that counts as in plane
 _PLANE = 2e-3
@@ -78,7 +78,7 @@ def brightness(scan: "xr.Dataset") -> tuple[np.ndarray, np.ndarray] | None:
     return None
 
 
-def curves(scan: "xr.Dataset") -> Iterator[Curve]:
+def curves_of(scan: "xr.Dataset") -> Iterator[Curve]:
     """Yield the readings of each incidence, azimuth of the source and wavelength."""
     found = brightness(scan)
     if found is None:
