@@ -19,19 +19,25 @@ from data_io.reflectance.model import read_model, write_model
 from data_io.reflectance.results import read_result, write_result
 from data_io.text.files import NotAMapError
 from data_io.text.units import MissingUnitWarning
+from data_io.topography.bands import Bands, find_bands
 from data_io.topography.channels import ChannelWarning
 from data_io.topography.height_map import read_height_map
 from data_io.topography.profile import Profile, holds_profile, read_profile, write_profile
+from data_io.topography.terraces import Deterraced, deterrace
 
 __all__ = [
+    "Bands",
     "ChannelWarning",
     "ConventionWarning",
+    "Deterraced",
     "EdgeProfile",
     "MicrographWarning",
     "MissingUnitWarning",
     "NotAMapError",
     "Profile",
+    "deterrace",
     "export_mitsuba",
+    "find_bands",
     "holds_profile",
     "in_plane",
     "read_goniometer",

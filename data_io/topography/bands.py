@@ -1,0 +1,161 @@
+"""Terraces of a map: bands of equal heights left by a digitised picture or 8-bit export."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+Array = np.ndarray
+
+# Fewer levels are a surface of steps, or one that was drawn
+FEWEST_LEVELS = 6
+# Equal heights of neighbours, as a share; noise and slopes of a finer step leave few
+LEAST_EQUAL = 0.1
+# Share of heights on plateaus; blur of a picture leaves others at their rims
+_ON_PLATEAUS = 0.25
+_MOST_LEVELS = 1000
+# Heights that a blurred rim may take between two plateaus
+_RIM = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """Levels of a terraced map, and the band of heights that each stands for.
+
+    Parameters
+    ----------
+    levels : ndarray, shape (n,)
+        Rising. [um]
+    edges : ndarray, shape (n + 1,)
+        Between neighbouring levels, and half a band beyond the first and last. [um]
+    equal : float
+        Share of neighbouring heights that are equal. [1]
+    """
+
+    levels: Array
+    edges: Array
+    equal: float
+
+    @property
+    def width(self) -> float:
+        """Mean width of the bands. [um]"""
+        return float(np.mean(np.diff(self.edges)))
+
+    def limits(self, heights: Array) -> tuple[Array, Array]:
+        """Lowest and highest true height at every node, infinite where missing. [um]
+
+        A height between two plateaus, as blur leaves it, counts to the nearer one.
+        """
+        known = np.isfinite(heights)
+        place = np.searchsorted(self.edges[1:-1], np.where(known, heights, 0.0))
+        low = np.where(known, self.edges[place], -np.inf)
+        return low, np.where(known, self.edges[place + 1], np.inf)
+
+
+def equal_neighbours(heights: Array) -> float:
+    """Share of pairs of neighbouring heights that are equal."""
+    equal = pairs = 0
+    for axis in range(heights.ndim):
+        difference = np.diff(heights, axis=axis)
+        known = np.isfinite(difference)
+        pairs += int(known.sum())
+        equal += int((np.abs(difference[known]) <= _tolerance(heights)).sum())
+    return equal / max(pairs, 1)
+
+
+def _tolerance(heights: Array) -> float:
+    """Heights that differ by rounding of the file are one. [um]"""
+    return 1e-6 * float(np.nanmax(heights) - np.nanmin(heights))
+
+
+def find_bands(heights: Array) -> Bands | None:
+    """Find the levels of a terraced map; None if its heights are not in bands.
+
+    A level is a height that neighbours share; a quarter of all heights must lie on levels,
+    of which there are at least six, and a tenth of all neighbours must be equal.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (nx, ny)
+        As measured, before any form is removed; NaN where missing. [um]
+
+    Examples
+    --------
+    >>> x = np.arange(60.0)
+    >>> find_bands(np.round(8 * np.sin(x / 7) + np.cos(x[:, None] / 5))).width
+    1.0
+    >>> find_bands(np.sin(x / 7) + np.cos(x[:, None] / 5)) is None
+    True
+    """
+    known = heights[np.isfinite(heights)]
+    if known.size < 100 or np.ptp(known) == 0:
+        return None
+    equal = equal_neighbours(heights)
+    if equal < LEAST_EQUAL:
+        return None
+    levels = _plateaus(heights)
+    if not FEWEST_LEVELS <= levels.size <= _MOST_LEVELS:
+        return None
+    near = np.abs(known - levels[_nearest(levels, known)])
+    if np.mean(near <= 2 * _tolerance(heights)) < _ON_PLATEAUS:
+        return None
+    return Bands(levels, _edges(levels), equal)
+
+
+def _plateaus(heights: Array) -> Array:
+    """Return the heights that many neighbours share, each once. [um]"""
+    tolerance = _tolerance(heights)
+    shared = []
+    for axis in range(heights.ndim):
+        difference = np.diff(heights, axis=axis)
+        first = heights[:-1] if axis == 0 else heights[:, :-1]
+        shared.append(first[np.abs(difference) <= tolerance])
+    values = np.sort(np.concatenate(shared))
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(values) > 2 * tolerance) + 1])
+    counts = np.diff(np.concatenate([starts, [values.size]]))
+    found = values[starts + counts // 2]
+    known = np.sort(heights[np.isfinite(heights)])
+    ends = [np.searchsorted(known, found + side * 2 * tolerance) for side in (-1, 1)]
+    return found[~_between_plateaus(counts, counts / np.maximum(ends[1] - ends[0], 1))]
+
+
+def _between_plateaus(counts: Array, shared: Array) -> Array:
+    """Tell which heights are blurred rims of the bands on either side.
+
+    They are rarer than others on both sides of them, much rarer or less often shared with
+    a neighbour. Beyond the last of the others they are bands that few nodes reach.
+
+    Parameters
+    ----------
+    counts : ndarray, shape (n,)
+        Neighbours that share each height.
+    shared : ndarray, shape (n,)
+        The same for each node of that height.
+    """
+    places = np.pad(np.arange(counts.size), _RIM, constant_values=counts.size)
+    window = np.lib.stride_tricks.sliding_window_view(places, _RIM)
+    counted, often = np.append(counts, 0), np.append(shared, 0.0)
+    sides = []
+    for near in (window[: counts.size], window[_RIM + 1 :]):
+        most = np.take_along_axis(near, counted[near].argmax(axis=1)[:, None], axis=1)[:, 0]
+        sides.append((counted[most], often[most]))
+    rarer = np.minimum(sides[0][0], sides[1][0]) / np.maximum(counts, 1)
+    lonelier = np.minimum(sides[0][1], sides[1][1]) > 2 * shared
+    enough = np.minimum(sides[0][0], sides[1][0]) > counts + 10
+    return np.asarray(enough & ((rarer > 4) | ((rarer > 1.5) & lonelier)))
+
+
+def _nearest(levels: Array, values: Array) -> Array:
+    """Return the place of the nearest level of each value."""
+    return np.searchsorted((levels[1:] + levels[:-1]) / 2, values)
+
+
+def _edges(levels: Array) -> Array:
+    """Return the limits of the bands: half way, but no wider than others nearby."""
+    gaps = np.diff(levels)
+    # A level that no node has is no reason to make its neighbours wider
+    usual = np.array([np.median(gaps[max(i - 4, 0) : i + 5]) for i in range(gaps.size)])
+    half = np.minimum(gaps, 1.5 * usual) / 2
+    middle = (levels[1:] + levels[:-1]) / 2
+    middle = np.where(gaps > 1.5 * usual, levels[:-1] + half, middle)
+    first, last = levels[0] - half[0], levels[-1] + half[-1]
+    return np.concatenate([[first], middle, [last]])
