@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
-from scipy import optimize, special
+from scipy import ndimage, optimize, special
 
 Array = np.ndarray
 
@@ -48,6 +48,15 @@ class Prior:
     def longest(self) -> float:
         """Longest correlation length over all directions. [steps]"""
         return float(1 / np.sqrt(np.linalg.eigvalsh(self.metric)[0]))
+
+    def correlation_to_nearest(self, known: Array) -> Array:
+        """Autocorrelation of every node's height with the nearest known one."""
+        if known.all():
+            return np.ones(known.shape)
+        distance = ndimage.distance_transform_edt(
+            ~known, sampling=np.sqrt(np.diag(self.metric))
+        )
+        return correlation(distance, self.smoothness)
 
     def spectrum(self, shape: tuple[int, int]) -> Array:
         """Power of each coefficient of `rfft2`, over the number of nodes. [um²]"""

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.fft
 from scipy import special
+from scipy.sparse import linalg
 
 from data_io.topography.bands import Bands, find_bands
 from data_io.topography.roughness_prior import fit_prior
@@ -117,8 +118,8 @@ def deterrace(
     least = (_LEAST_NOISE * bands.width) ** 2
     noise = max(prior.noise, least)
     spectrum = prior.spectrum(shape)
-    field = np.zeros(shape)
-    field[inside] = np.where(known, middle - level, 0.0)
+    margin = [(0, n - m) for n, m in zip(shape, heights.shape, strict=True)]
+    field = np.pad(np.where(known, middle - level, 0.0), margin, mode="symmetric")
     observed = np.isfinite(limits[0])
     total = np.zeros(shape)
     square = np.zeros(shape)
@@ -128,6 +129,9 @@ def deterrace(
         noisy[observed] = _cut_normal(
             rng, field[observed], np.sqrt(noise), limits[0][observed], limits[1][observed]
         )
+        # What lies in a hole follows its rim too slowly from draw to draw
+        if i in (0, 2 * draws - 1) and not known.all():
+            noisy = _in_holes(noisy, observed, spectrum, noise, rng)
         field = _surface_given(noisy, spectrum, noise, rng)
         noise = max(float(np.mean((noisy - field)[observed] ** 2)), least)
         if i >= draws:
@@ -135,7 +139,8 @@ def deterrace(
             square += field**2
     mean = total[inside] / draws
     variance = (square[inside] - draws * mean**2) / (draws - 1)
-    scatter = np.sqrt(np.maximum(variance, 0))
+    unseen = prior.variance * (1 - prior.correlation_to_nearest(known) ** 2)
+    scatter = np.sqrt(np.maximum(variance, np.where(known, 0.0, unseen)))
     chosen = field[inside] if draw else mean
     found = HeightMap(
         chosen + level, surface.spacing, periodic=surface.periodic, labels=surface.labels
@@ -164,6 +169,39 @@ def _surface_given(
     gain = spectrum / (spectrum + noise)
     drawn = gain * seen + np.sqrt(gain * noise) * white
     return scipy.fft.irfft2(drawn, s=noisy.shape, workers=1)
+
+
+def _in_holes(
+    noisy: Array, observed: Array, spectrum: Array, noise: float, rng: np.random.Generator
+) -> Array:
+    """Draw what was not observed, given what was, at once.
+
+    A free draw of the field and its noise is corrected by the mean surface that its
+    difference from the observed heights implies (Matheron). With F the Wiener filter that
+    mean solves x = F (d + x) on the unobserved nodes.
+    """
+
+    def filtered(values: Array) -> Array:
+        seen = scipy.fft.rfft2(values, workers=1) * spectrum / (spectrum + noise)
+        return scipy.fft.irfft2(seen, s=values.shape, workers=1)
+
+    white = scipy.fft.rfft2(rng.standard_normal(noisy.shape), workers=1)
+    free = scipy.fft.irfft2(np.sqrt(spectrum) * white, s=noisy.shape, workers=1)
+    free += np.sqrt(noise) * rng.standard_normal(noisy.shape)
+    hidden = ~observed
+    full = np.where(observed, noisy - free, 0.0)
+
+    def left(x: Array) -> Array:
+        full_x = np.zeros(noisy.shape)
+        full_x[hidden] = x
+        return x - filtered(full_x)[hidden]
+
+    count = int(hidden.sum())
+    system = linalg.LinearOperator((count, count), matvec=left, dtype=float)
+    mean, _ = linalg.cg(system, filtered(full)[hidden], rtol=1e-4, maxiter=80)
+    drawn = noisy.copy()
+    drawn[hidden] = free[hidden] + mean
+    return drawn
 
 
 def _cut_normal(
