@@ -63,7 +63,7 @@ def read_goniometer(  # noqa: PLR0913  (each is a convention that files leave op
     format : str, optional
         ``"csv"`` (the project's own, and other tables with names of columns), ``"astm"``,
         ``"fred"``, ``"zemax"``, ``"nist"`` or ``"spacecraft"``; by default told from the
-        content.
+        content. A ``.pbsdf`` of Mitsuba or KAIST is read too.
     columns : mapping of str to str, or path, optional
         What columns mean: ``{"AOI": "theta_i_deg", "note": "ignore"}``; or a TOML file with
         a table ``[columns]`` and the declarations below as keys.
@@ -127,6 +127,8 @@ def read_goniometer(  # noqa: PLR0913  (each is a convention that files leave op
         source_half_angle=source_half_angle,
         detector_half_angle=detector_half_angle,
     )
+    if format is None and _is_tensor(path):
+        return _of_renderer(path, said)
     lines = read_lines(path)
     name = format or _detect(path, lines)
     for word in _TABLE:
@@ -137,6 +139,24 @@ def read_goniometer(  # noqa: PLR0913  (each is a convention that files leave op
             )
             raise ValueError(msg)
     return to_dataset(as_declared(_FORMATS[name].read(path, lines, said), said))
+
+
+def _is_tensor(path: Path) -> bool:
+    """Tell whether a file is a .pbsdf, by its first bytes."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as stream:
+        return stream.read(12) == b"tensor_file\0"
+
+
+def _of_renderer(path: Path, said: Declared) -> xr.Dataset:
+    """Read a .pbsdf, whose conventions are all fixed."""
+    from data_io.reflectance.pbsdf import read_pbsdf
+
+    if said != Declared():
+        msg = f"a .pbsdf file fixes its conventions, got {said.words()} for {path.name}."
+        raise ValueError(msg)
+    return read_pbsdf(path)
 
 
 def write_goniometer(dataset: xr.Dataset, path: str | Path) -> None:

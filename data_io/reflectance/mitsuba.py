@@ -149,18 +149,34 @@ def _tabulate(brdf: Brdf, grid: HalfVectorGrid) -> np.ndarray:
 
     Shape (wavelength, n_phi_d, n_theta_d, n_theta_h, 4, 4).
     """
-    to_light, to_viewer, s_axis = half_vector_geometry(grid)
-    phi_i, phi_s = (np.arctan2(d[..., 1], d[..., 0]) for d in (to_light, to_viewer))
-    theta_i, theta_s = (
-        np.minimum(np.arctan2(np.hypot(d[..., 0], d[..., 1]), d[..., 2]), _LAST_ZENITH)
-        for d in (to_light, to_viewer)
+    geometry = half_vector_geometry(grid)
+    theta_i, theta_s, dphi = zeniths(geometry)
+    mueller = brdf(
+        np.minimum(theta_i, _LAST_ZENITH), np.minimum(theta_s, _LAST_ZENITH), dphi
     )
-    dphi = np.mod(phi_s - phi_i, 2 * np.pi)
-    mueller = brdf(theta_i, theta_s, dphi)
+    into, out_of = file_frames(geometry)
+    return into @ mueller @ np.swapaxes(out_of, -1, -2)
+
+
+def zeniths(geometry: Geometry) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return theta_i, theta_s (beyond pi/2 below the horizon) and dphi. [rad]"""
+    ends = geometry.to_light, geometry.to_viewer
+    phi_i, phi_s = (np.arctan2(d[..., 1], d[..., 0]) for d in ends)
+    theta_i, theta_s = (np.arctan2(np.hypot(d[..., 0], d[..., 1]), d[..., 2]) for d in ends)
+    return theta_i, theta_s, np.mod(phi_s - phi_i, 2 * np.pi)
+
+
+def file_frames(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
+    """Return rotations from the meridian frames of both beams into those of the file.
+
+    A file has ``into @ M @ out_of.T`` of the M of the conventions; (..., 4, 4) each, that
+    of the scattered beam first.
+    """
+    to_light, to_viewer, s_axis = geometry
+    phi_i, phi_s = (np.arctan2(d[..., 1], d[..., 0]) for d in (to_light, to_viewer))
     # Light arrives along -L: its azimuth of travel is opposite to that of the source
     into = _into_file_frame(to_viewer, phi_s, s_axis)
-    out_of = _into_file_frame(-to_light, phi_i + np.pi, s_axis)
-    return into @ mueller @ np.swapaxes(out_of, -1, -2)
+    return into, _into_file_frame(-to_light, phi_i + np.pi, s_axis)
 
 
 def _into_file_frame(

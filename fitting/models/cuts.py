@@ -19,7 +19,7 @@ def plane_curves(
     analytic: "MicrofacetModel",
     monte_carlo: "SimulatedModel | None" = None,
 ) -> xr.Dataset:
-    """Return M00, M10 and DOLP of the models against incidence and signed view angle.
+    """Return M00, M10, m10 and DOLP of the models against incidence and signed view.
 
     Parameters
     ----------
@@ -47,6 +47,7 @@ def plane_curves(
             "monte_carlo_M00_stderr": error[..., 0, 0],
             "monte_carlo_M10_stderr": error[..., 1, 0],
             # M00 and M10 of a bin err together, so their ratio errs less than this
+            "monte_carlo_m10_stderr": error[..., 1, 0] / simulated[..., 0, 0],
             "monte_carlo_DOLP_stderr": error[..., 1, 0] / simulated[..., 0, 0],
         }
     return xr.Dataset(
@@ -60,5 +61,6 @@ def _named(model: str, mueller: np.ndarray) -> dict[str, np.ndarray]:
     return {
         f"{model}_M00": m00,
         f"{model}_M10": m10,
+        f"{model}_m10": m10 / m00,
         f"{model}_DOLP": np.hypot(m10, m20) / m00,
     }

@@ -236,6 +236,29 @@ def predict(
     return Prediction(function)
 
 
+def _mean_dolp(square: Any, stderr: np.ndarray) -> Any:
+    """Return the mean reading of a DOLP whose square is given, lifted by noise of Q and U.
+
+    A length of two components with noise s is Rice's [1]_: p + s^2 / (2 p) where p is far
+    above s, sqrt(pi/2) s where there is no polarisation. In units of s the root of
+    p^2 + 1 + (pi/2 - 1) exp(-p^2/3) is its mean to 0.008. A reading without a stated error
+    is taken as it is.
+
+    References
+    ----------
+    .. [1] S. O. Rice, Mathematical analysis of random noise, Bell Syst. Tech. J. 24, 46
+       (1945).
+    """
+    import casadi
+
+    noise = casadi.DM(np.nan_to_num(stderr) ** 2)
+    # The tiny term gives the root a derivative where polarisation vanishes
+    noise = noise + 1e-24
+    return casadi.sqrt(
+        square + noise * (1.0 + (np.pi / 2 - 1.0) * casadi.exp(-square / (3.0 * noise)))
+    )
+
+
 def _readings(observations: Observations, linear: Any) -> Any:
     """Return the column of observables: linear ones, normalised elements, DOLP."""
     import casadi
@@ -257,8 +280,7 @@ def _readings(observations: Observations, linear: Any) -> Any:
         parts.append(of(normal, divided) / of(normal, "M00"))
     if dolp.size:
         total, q, u = (of(dolp, element) for element in ("M00", "M10", "M20"))
-        # The tiny term gives the root a derivative where polarisation vanishes
-        parts.append(casadi.sqrt((q**2 + u**2) / total**2 + 1e-24))
+        parts.append(_mean_dolp((q**2 + u**2) / total**2, observations.stderr[dolp]))
     if len(parts) == 1:
         return parts[0]
     order = np.argsort(np.concatenate(groups))

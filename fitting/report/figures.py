@@ -16,7 +16,8 @@ __all__ = ["hemisphere_figure", "histogram_figure", "new_figure", "scan_figure"]
 
 # Colours that stay apart in print and for colour-blind eyes (Okabe and Ito)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-QUANTITIES = {"M00": "M00 [1/sr]", "M10": "M10 [1/sr]", "DOLP": "DOLP [1]"}
+# The ratio keeps its sign: noise lifts a DOLP, which has none
+QUANTITIES = {"M00": "M00 [1/sr]", "M10": "M10 [1/sr]", "m10": "M10/M00 [1]"}
 # Label, line style, and colour where one incidence leaves colours for the models
 MODELS = {
     "monte_carlo": ("Monte Carlo", "-", COLOURS[0]),
@@ -58,7 +59,9 @@ def histogram_figure(histograms: "Sequence[Histogram]") -> "Figure":
 
 
 def scan_figure(measured: xr.Dataset, curves: xr.Dataset | None = None) -> "Figure":
-    """Draw M00, M10 and DOLP against view angle: measured, analytical and Monte Carlo.
+    """Draw M00, M10 and their ratio against view angle: measured, analytical, Monte Carlo.
+
+    A scan that has a DOLP only is drawn with that.
 
     Parameters
     ----------
@@ -67,12 +70,12 @@ def scan_figure(measured: xr.Dataset, curves: xr.Dataset | None = None) -> "Figu
     curves : Dataset, dims theta_i, theta_view, optional
         `analytic_*`, `monte_carlo_*` and `monte_carlo_*_stderr` of each quantity.
     """
-    measured = _with_dolp(measured)
+    measured, quantities = _with_ratio(measured)
     incidences = np.unique(measured.theta_i.values.round(9))
     rows = 1 if curves is None else 2
     decades = "M00" in measured and _spans_decades(measured["M00"].values)
-    figure, axes = new_figure(rows, len(QUANTITIES), (4.3 * len(QUANTITIES), 2.8 * rows))
-    for column, (name, label) in enumerate(QUANTITIES.items()):
+    figure, axes = new_figure(rows, len(quantities), (4.3 * len(quantities), 2.8 * rows))
+    for column, (name, label) in enumerate(quantities.items()):
         upper = axes[0, column]
         for position, theta_i in enumerate(incidences):
             scan = measured.isel(geometry=np.abs(measured.theta_i.values - theta_i) < 1e-8)
@@ -158,16 +161,25 @@ def _hemisphere_panels(
         yield "DOLP [1]", np.hypot(m10, m20) / m00, "viridis", (0.0, 1.0)
 
 
-def _with_dolp(measured: xr.Dataset) -> xr.Dataset:
-    """Return the scan with DOLP from M00, M10 and M20 where it was not given."""
-    if "DOLP" in measured or not {"M00", "M10"} <= set(measured.data_vars):
-        return measured
-    m20 = measured["M20"].fillna(0.0) if "M20" in measured else 0.0
-    dolp = np.hypot(measured.M10, m20) / measured.M00
-    derived = measured.assign(DOLP=dolp.where(measured.M00 > 0.0))
-    if "M10_stderr" in measured:
-        derived["DOLP_stderr"] = measured.M10_stderr / measured.M00
-    return derived
+def _with_ratio(measured: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
+    """Return the scan with M00, M10 and their ratio where they follow; what to draw."""
+    if {"I_s", "I_p"} <= set(measured.data_vars) and "M00" not in measured:
+        error = {}
+        if {"I_s_stderr", "I_p_stderr"} <= set(measured.data_vars):
+            both = np.hypot(measured.I_s_stderr, measured.I_p_stderr)
+            error = {"M00_stderr": both, "M10_stderr": both}
+        measured = measured.assign(
+            M00=measured.I_s + measured.I_p, M10=measured.I_s - measured.I_p, **error
+        )
+    if "m10" not in measured and {"M00", "M10"} <= set(measured.data_vars):
+        lit = measured.M00.where(measured.M00 > 0.0)
+        measured = measured.assign(m10=measured.M10 / lit)
+        if "M10_stderr" in measured:
+            measured["m10_stderr"] = measured.M10_stderr / lit
+    if "DOLP" in measured and "m10" not in measured:
+        names = {name: label for name, label in QUANTITIES.items() if name != "m10"}
+        return measured, names | {"DOLP": "DOLP [1]"}
+    return measured, QUANTITIES
 
 
 def _spans_decades(values: np.ndarray) -> bool:

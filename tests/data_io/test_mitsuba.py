@@ -13,7 +13,8 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
-from data_io import export_mitsuba
+from data_io import export_mitsuba, read_goniometer
+from data_io.reflectance import pbsdf
 from data_io.reflectance.mitsuba import HalfVectorGrid, _tabulate
 from pbrdf import AccuracyWarning, Material, MicrofacetModel
 from pbrdf.optics.exchange import convert_brdf
@@ -284,3 +285,48 @@ def test_mitsuba_itself_reads_the_file(tmp_path):
         errors.append(np.abs(found - expected).max() / expected[0, 0])
     assert np.median(errors) < 2e-3
     assert max(errors) < 0.05
+
+
+def test_a_file_is_read_back_as_the_scan_it_holds(tmp_path):
+    """All elements at the file's own directions, in the project's frames again."""
+    path = tmp_path / "metal.pbsdf"
+    export_mitsuba(METAL, path, shape=(25, 12, 13), wavelength=[0.45, 0.55, 0.65])
+    scan = read_goniometer(path)
+    angles_ = [scan[name].values for name in ("theta_i", "theta_s", "dphi")]
+    expected = METAL.brdf(*angles_)
+    for i in range(4):
+        for j in range(4):
+            # Nodes and values have 24 bits
+            assert_allclose(scan[f"M{i}{j}"], expected[:, i, j], rtol=1e-5, atol=1e-5)
+    assert_allclose(np.unique(scan.wavelength), [0.45, 0.55, 0.65])
+    keys = np.column_stack([*(np.round(a, 6) for a in angles_), scan.wavelength])
+    assert len(np.unique(keys, axis=0)) == scan.sizes["geometry"] > 3000
+    # Out of the plane, where frames differ, among them
+    assert (np.abs(np.sin(angles_[2])) > 0.5).sum() > 500
+    with pytest.raises(ValueError, match="fixes its conventions, got quantity relative"):
+        read_goniometer(path, quantity="relative")
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda b: b[:-400], "truncated"),
+        (lambda b: b[:30], "expected a table of fields, found it damaged"),
+        (lambda b: b.replace(b"wvls", b"wxls"), "lacks wvls"),
+        (lambda b: b[:12] + b"\x07" + b[13:], "expected version 1.0, got 7.0"),
+    ],
+)
+def test_a_damaged_file_is_refused(tmp_path, edit, message):
+    path = tmp_path / "metal.pbsdf"
+    export_mitsuba(METAL, path, shape=(5, 4, 4))
+    path.write_bytes(edit(path.read_bytes()))
+    with pytest.raises(pbsdf.DataFileError, match=message):
+        read_goniometer(path)
+
+
+def test_a_large_table_is_thinned_with_a_word(tmp_path, monkeypatch):
+    path = tmp_path / "metal.pbsdf"
+    export_mitsuba(METAL, path, shape=(9, 8, 8))
+    monkeypatch.setattr(pbsdf, "_ROWS", 200)
+    with pytest.warns(UserWarning, match="every 2. node of each angle is read, of 576"):
+        assert read_goniometer(path).sizes["geometry"] < 200

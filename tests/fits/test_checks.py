@@ -161,3 +161,21 @@ def test_declared_cases_are_fitted_to_their_truth():
     assert_allclose(result.values["diffuse_albedo"], 0.05, rtol=1e-5)
     noisy = fit(read_goniometer(CASES / "negative_noise.csv"), MODEL)
     assert noisy.estimates["diffuse_albedo"].low == 0.0
+
+
+def test_a_dolp_within_its_noise_does_not_bias_the_fit():
+    """Weak polarisation read as a length is lifted by noise; the model allows for it."""
+    truth = MicrofacetModel(Material(1.5), slope_rms=0.3, diffuse_albedo=0.7)
+    scan = scan_of(truth, incidences=(45,), views=np.arange(-60, 61, 4))
+    ratio = (scan.M10 / scan.M00).values
+    rng, noise, found = np.random.default_rng(11), 0.05, []
+    for _ in range(40):
+        light = ratio + rng.normal(0, noise, ratio.size)
+        dolp = np.hypot(light, rng.normal(0, noise, ratio.size))
+        noisy = scan.drop_vars("M10").assign(
+            DOLP=("geometry", dolp), DOLP_stderr=("geometry", np.full(dolp.size, noise))
+        )
+        found.append(fit(noisy, truth, free=("diffuse_albedo",), use=("DOLP",)))
+    values = np.array([result.values["diffuse_albedo"] for result in found])
+    # Without Rice's mean the fits give 0.61, eight standard errors low
+    assert abs(values.mean() - 0.7) < 3.5 * values.std(ddof=1) / np.sqrt(values.size)

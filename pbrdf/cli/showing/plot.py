@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pbrdf.cli import options
+from pbrdf.cli import declaring, options
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,6 +29,11 @@ def command(
         ),
     ] = 30.0,
     wavelength: options.Wavelength = None,
+    columns: declaring.ScanColumns = None,
+    azimuth_of_forward: declaring.Forward = None,
+    angles: declaring.Angles = None,
+    quantity: declaring.QuantityOption = None,
+    normalised: declaring.Normalised = None,
     at: Annotated[
         list[str] | None,
         typer.Option(
@@ -37,7 +42,7 @@ def command(
         ),
     ] = None,
 ) -> None:
-    """Draw M00, M10 and DOLP: of a scan in the plane, of a result over the hemisphere.
+    """Draw M00, M10 and polarisation: a scan in plane, a result over the hemisphere.
 
     Example: pbrdf plot result.nc --theta-i-deg 60 -o result.png
     """
@@ -62,7 +67,12 @@ def command(
                 places["wavelength"] = wavelength
             figure = hemisphere_figure(_cut(result, places), float(np.deg2rad(theta_i)))
         else:
-            scan = data_io.in_plane(read_scan(source, wavelength=wavelength))
+            declared = declaring.declarations(
+                columns, azimuth_of_forward, angles, quantity, normalised
+            )
+            scan = data_io.in_plane(
+                read_scan(source, wavelength=wavelength, declared=declared)
+            )
             if not scan.sizes["geometry"]:
                 msg = f"{source.name} must have rows in the plane of incidence, got none."
                 raise ValueError(msg)

@@ -160,7 +160,8 @@ def _check_plausible(path: Path, block: Block, waves: np.ndarray) -> None:
             f"expected an index near 1 at {given:g} {spectral.unit} "
             f"({1e3 * waves[row]:.3g} nm, X-rays), got {index[row]:g}"
         )
-        cure = f"The unit is not {spectral.unit}: name the right one, for example nm."
+        other = "nm" if spectral.unit != "nm" else "um"
+        cure = f"The unit is not {spectral.unit}: name the right one, for example {other}."
         raise DataFileError(
             path, problem, cure, line=block.lines[row], column=spectral.name
         )
