@@ -89,15 +89,31 @@ class Moments:
             raise ValueError(msg)
 
     def _one_path(self) -> np.ndarray:
-        """Mean flux of one escaped path (angles, wavelengths, bounces) in the mean flux."""
-        counts = self.counts[:, None, shading.N_ORDERS : shading.N_MISMATCH]
+        """Mean flux of one escaped path (angles, wavelengths, bounces) in the mean flux.
+
+        A class of bounces that no path reached has that of the nearest class that some did,
+        first of fewer bounces, which weaken light less; without any, that of a whole ray.
+        """
+        counts = self._by_class()
         albedo = np.mean(self._albedo, axis=0)
-        return np.where(counts > 0, albedo / np.maximum(counts, 1), 0.0)
+        one = np.where(counts > 0, albedo / np.maximum(counts, 1), np.nan)
+        for order in range(1, one.shape[2]):
+            one[..., order] = _or_else(one[..., order], one[..., order - 1])
+        for order in reversed(range(one.shape[2] - 1)):
+            one[..., order] = _or_else(one[..., order], one[..., order + 1])
+        return _or_else(one, 1.0 / (self.plan.n_rays * self.samples))
+
+    def _by_class(self) -> np.ndarray:
+        """Count escaped paths (angles, 1, bounces)."""
+        return self.counts[:, None, shading.N_ORDERS : shading.N_MISMATCH]
 
     def _one_of_all(self) -> np.ndarray:
         """Return the same for all bounces together (angles, wavelengths)."""
-        one: np.ndarray = np.sqrt((self._one_path() ** 2).sum(axis=2))
-        return one
+        one = self._one_path()
+        # Of the classes that paths reached; of all, which are alike, if none did
+        squares = np.where(self._by_class() > 0, one**2, 0.0).sum(axis=2)
+        total: np.ndarray = np.sqrt(np.where(squares > 0.0, squares, one[..., 0] ** 2))
+        return total
 
     def _estimate(self, mean: np.ndarray, scatter: np.ndarray, one: np.ndarray) -> None:
         """Turn moments (..., n_theta, n_dphi, stokes, stokes) into BRDF and error in place.
@@ -128,11 +144,15 @@ class Moments:
         return self._mean, self._scatter, total, self._scatter_total
 
     def albedo(self) -> tuple[np.ndarray, np.ndarray]:
-        """Albedo (angles, wavelengths, bounces) and its standard error."""
+        """Albedo (angles, wavelengths, bounces) and its standard error.
+
+        Where no path came there is no spread, but the error of one path.
+        """
         values = np.array(self._albedo)
         if self.samples < 2:
             return values.mean(axis=0), np.full(values.shape[1:], np.nan)
-        return values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(self.samples)
+        spread = values.std(axis=0, ddof=1) / np.sqrt(self.samples)
+        return values.mean(axis=0), np.where(self._by_class() > 0, spread, self._one_path())
 
     def energy(self) -> np.ndarray:
         """Mean energy by fate (angles, wavelengths, 4)."""
@@ -168,6 +188,11 @@ class _Part:
             np.empty((4, MAX_ORDER)),
         )  # fmt: skip
         return cls(first=first, last=last, room=room)
+
+
+def _or_else(values: np.ndarray, other: np.ndarray | float) -> np.ndarray:
+    """Return the values, and the others where they are missing."""
+    return np.where(np.isnan(values), other, values)
 
 
 def neighbour_room(bins: tuple[int, ...], elements: int) -> neighbours.Room:
