@@ -1,37 +1,23 @@
 """Reading and writing of goniometer files; which format a file has."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import xarray as xr
 
 from data_io.goniometer.dataset import to_dataset
 from data_io.goniometer.declarations import Declared, declared
 from data_io.goniometer.formats import astm, fred, nist, spacecraft, zemax
-from data_io.goniometer.scan import QUANTITIES, Scan
+from data_io.goniometer.scan import QUANTITIES
 from data_io.goniometer.tables import own_csv
 from data_io.goniometer.tables.quantities import as_declared
 from data_io.goniometer.tables.writing import write_csv
-from data_io.text.text import Line, is_comment, read_lines
+from data_io.text.text import Line, read_lines, without_comments
 from pbrdf.errors import DataFileError
 
-
-class _Format(NamedTuple):
-    """A format: its reader, and which declarations it can need."""
-
-    read: Callable[[Path, list[Line], Declared], Scan]
-    takes: tuple[str, ...] = ()
-
-
-_TABLE = ("columns", "azimuth_of_forward", "angles", "normalised")
+# In the order in which they are tried: a table of columns is the last resort
 _FORMATS = {
-    "csv": _Format(own_csv.read, _TABLE),
-    "astm": _Format(astm.read, _TABLE),
-    "fred": _Format(fred.read, ("azimuth_of_forward",)),
-    "zemax": _Format(lambda path, lines, _: zemax.read(path, lines)),
-    "nist": _Format(lambda path, lines, _: nist.read(path, lines)),
-    "spacecraft": _Format(lambda path, lines, _: spacecraft.read(path, lines)),
+    module.NAME: module for module in (zemax, fred, nist, spacecraft, astm, own_csv)
 }
 # First words of files that hold a BSDF in a way that is not read
 _FOREIGN = {
@@ -131,8 +117,8 @@ def read_goniometer(  # noqa: PLR0913  (each is a convention that files leave op
         return _of_renderer(path, said)
     lines = read_lines(path)
     name = format or _detect(path, lines)
-    for word in _TABLE:
-        if word not in _FORMATS[name].takes and getattr(said, word) not in (None, {}):
+    for word in own_csv.TAKES:
+        if word not in _FORMATS[name].TAKES and getattr(said, word) not in (None, {}):
             msg = (
                 f"{word.replace('_', '-')} does not belong to a {name} file, whose "
                 f"conventions are fixed, got {path.name}. Leave it out."
@@ -199,8 +185,7 @@ def write_goniometer(dataset: xr.Dataset, path: str | Path) -> None:
 
 def _detect(path: Path, lines: list[Line]) -> str:
     """Tell the format from the content."""
-    comments = [line for line in lines if is_comment(line)]
-    content = [line for line in lines if line.text.strip() and not is_comment(line)]
+    content = without_comments(lines)
     if not content:
         problem = "expected rows of a scan, found comments only"
         raise DataFileError(path, problem, "The file is truncated.")
@@ -210,16 +195,8 @@ def _detect(path: Path, lines: list[Line]) -> str:
             problem = f"expected a goniometer file in a known format, got {what}"
             cure = f"Export a table; known are {', '.join(_FORMATS)} and .pbsdf."
             raise DataFileError(path, problem, cure, line=content[0].number)
-    candidates = {
-        "zemax": zemax.looks_like(content),
-        "fred": fred.looks_like(content[0]),
-        "nist": nist.looks_like(content[0]),
-        "spacecraft": spacecraft.looks_like(comments),
-        "astm": astm.looks_like(content),
-        "csv": own_csv.looks_like(content),
-    }
-    for name, found in candidates.items():
-        if found:
+    for name, module in _FORMATS.items():
+        if module.looks_like(lines):
             return name
     problem = f"expected a goniometer file in a known format, got {first[:40]!r}"
     cure = f"Give a table with names of columns, or format= ({', '.join(_FORMATS)})."

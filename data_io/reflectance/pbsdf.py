@@ -74,6 +74,14 @@ def read_pbsdf(path: str | Path) -> xr.Dataset:
     if min(axis.size for axis in axes) == 0 or not ((waves > 10) & (waves < 65536)).all():
         problem = f"expected wavelengths in nanometres, got {waves.tolist()[:5]}"
         raise DataFileError(path, problem, _DAMAGED, column="wvls")
+    for name, axis, limit in (
+        ("phi_d", phi_d, 2 * np.pi), ("theta_d", theta_d, np.pi / 2),
+        ("theta_h", theta_h, np.pi / 2),
+    ):  # fmt: skip
+        low = -limit if name == "phi_d" else 0.0
+        if not ((axis >= low - 1e-3) & (axis <= limit + 1e-3)).all():
+            problem = f"expected radians in [{low:.4g}, {limit:.4g}], got {axis.max():.4g}"
+            raise DataFileError(path, problem, _DAMAGED, column=name)
     step = 1
     while table[::step, ::step, ::step].size / 16 > _ROWS:
         step += 1
@@ -171,6 +179,9 @@ def _array(
     size = 1
     for length in shape:
         size *= length
+    if not 0 < len(shape) < 10 or size == 0:
+        problem = f"expected the field {name} to hold numbers, got the shape {shape[:10]}"
+        raise DataFileError(path, problem, _DAMAGED)
     if size * kind.itemsize + offset > len(content):
         problem = f"expected the field {name} of shape {shape} in the file, it ends before"
         raise DataFileError(path, problem, "The file is truncated.")

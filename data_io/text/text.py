@@ -58,6 +58,11 @@ def is_comment(line: Line) -> bool:
     return line.text.lstrip().startswith(COMMENT_MARKS)
 
 
+def without_comments(lines: Iterable[Line]) -> list[Line]:
+    """Return the lines that say something and are no comments."""
+    return [line for line in lines if line.text.strip() and not is_comment(line)]
+
+
 def is_number(cell: str) -> bool:
     """Tell whether a cell holds one number; nan and inf count as numbers."""
     try:

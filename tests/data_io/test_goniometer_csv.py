@@ -304,7 +304,7 @@ def test_a_failure_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
 
 
 def test_an_unknown_format_name_is_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"format must be one of csv, astm.*got 'klems'"):
+    with pytest.raises(ValueError, match=r"format must be one of zemax, fred.*got 'klems'"):
         read_goniometer(write(tmp_path, f"{VIEW}\n30,10,1\n"), format="klems")
 
 

@@ -19,9 +19,12 @@ from pbrdf.errors import DataFileError
 _UNDECLARED = {"intensity", "power", "signal", "counts"}
 
 
-def looks_like(content: list[Line]) -> bool:
+NAME, TAKES = "astm", own_csv.TAKES
+
+
+def looks_like(lines: list[Line]) -> bool:
     """Tell whether a line VARS names the columns."""
-    return any(line.text.split()[:1] in (["VARS"], ["VARS="]) for line in content[:200])
+    return any(line.text.split()[:1] in (["VARS"], ["VARS="]) for line in lines[:200])
 
 
 def read(path: Path, lines: list[Line], declared: Declared) -> Scan:

@@ -15,16 +15,19 @@ import numpy as np
 from data_io.goniometer.declarations import Declared
 from data_io.goniometer.scan import Scan
 from data_io.goniometer.tables.angles import relative_azimuth
-from data_io.text.text import Line, is_number
+from data_io.text.text import Line, is_number, without_comments
 from pbrdf.errors import DataFileError
 
 _OPTION = re.compile(r"(\w+)\s*=\s*(\S+)")
 _OPTIONS = {"angles": ("deg", "rad"), "bsdf": ("value",), "scale": None}
 
 
-def looks_like(header: Line) -> bool:
+NAME, TAKES = "fred", ("azimuth_of_forward",)
+
+
+def looks_like(lines: list[Line]) -> bool:
     """Tell whether the first line is that of a FRED scatter table."""
-    return header.text.split()[:2] == ["type", "bsdf_data"]
+    return without_comments(lines)[0].text.split()[:2] == ["type", "bsdf_data"]
 
 
 def read(path: Path, lines: list[Line], declared: Declared) -> Scan:

@@ -29,9 +29,10 @@ from pathlib import Path
 
 import numpy as np
 
+from data_io.goniometer.declarations import Declared
 from data_io.goniometer.frames import rotation
 from data_io.goniometer.scan import ELEMENTS, Scan
-from data_io.text.text import Line, Rows, is_comment, read_numbers
+from data_io.text.text import Line, Rows, is_comment, read_numbers, without_comments
 from pbrdf.errors import DataFileError
 
 _GEOMETRY = ("lambda", "thetai", "phii", "thetar", "phir")
@@ -40,12 +41,16 @@ _ELEMENTS = tuple(f"{i}{j}" for i in range(1, 5) for j in range(1, 5))
 _ZERO_DEG = 1.5e-3
 
 
-def looks_like(header: Line) -> bool:
+NAME, TAKES = "nist", ()
+
+
+def looks_like(lines: list[Line]) -> bool:
     """Tell whether the header is that of the NIST table."""
+    header = without_comments(lines)[0]
     return header.text.replace(" ", "").lower().startswith("lambda,thetai")
 
 
-def read(path: Path, lines: list[Line]) -> Scan:
+def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     """Read the table."""
     content = [line for line in lines if line.text.strip() and not is_comment(line)]
     names = [cell.strip() for cell in content[0].text.split(",")]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from data_io.goniometer.declarations import Declared
 from data_io.goniometer.scan import Scan
 from data_io.text.text import Line, Rows, is_comment, read_numbers
 from pbrdf.errors import DataFileError
@@ -20,12 +21,16 @@ _NANOMETRES = re.compile(r"(\d+(?:\.\d+)?)\s*nm\b")
 _FLOOR_REPEATS = 3
 
 
-def looks_like(comments: list[Line]) -> bool:
+NAME, TAKES = "spacecraft", ()
+
+
+def looks_like(lines: list[Line]) -> bool:
     """Tell whether a comment names the columns."""
+    comments = filter(is_comment, lines)
     return any(line.text.strip("#% \t").split() == _COLUMNS for line in comments)
 
 
-def read(path: Path, lines: list[Line]) -> Scan:
+def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     """Read the five columns."""
     comments = [line.text.strip("#% \t") for line in lines if is_comment(line)]
     data = [line for line in lines if line.text.strip() and not is_comment(line)]

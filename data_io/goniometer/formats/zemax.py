@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from data_io.goniometer.declarations import Declared
 from data_io.goniometer.scan import ConventionWarning, Scan
-from data_io.text.text import Line, is_comment, is_number
+from data_io.text.text import Line, is_comment, is_number, without_comments
 from pbrdf.errors import DataFileError
 
 _AXES = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
@@ -28,12 +29,16 @@ _TIS_FACTOR = 2.5
 _NANOMETRES = re.compile(r"(\d+(?:\.\d+)?)\s*nm\b")
 
 
-def looks_like(content: list[Line]) -> bool:
+NAME, TAKES = "zemax", ()
+
+
+def looks_like(lines: list[Line]) -> bool:
     """Tell whether the lines without comments are a Zemax table."""
+    content = without_comments(lines)
     return any(line.text.split()[:1] == ["ScatterRadial"] for line in content)
 
 
-def read(path: Path, lines: list[Line]) -> Scan:
+def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     """Read the table; warn where its TIS is not its integral."""
     comments = [line.text.strip("# \t") for line in lines if is_comment(line)]
     content = [line for line in lines if line.text.strip() and not is_comment(line)]

@@ -12,14 +12,19 @@ from data_io.goniometer.tables.names import meaning_of
 from data_io.goniometer.tables.quantities import mueller_elements
 from data_io.goniometer.tables.table import read_table
 from data_io.goniometer.tables.writing import NOTES
-from data_io.text.text import Line
+from data_io.text.text import Line, without_comments
 from pbrdf.errors import DataFileError
 
 _QUANTITY = re.compile(r"quantity\s*[:=]\s*(\S+)")
 
 
-def looks_like(content: list[Line]) -> bool:
+NAME = "csv"
+TAKES = ("columns", "azimuth_of_forward", "angles", "normalised")
+
+
+def looks_like(lines: list[Line]) -> bool:
     """Tell whether a line names a column that is known, or has separators."""
+    content = without_comments(lines)
     words = [
         cell.strip().strip('"')
         for line in content[:30]
