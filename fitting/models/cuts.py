@@ -18,6 +18,7 @@ def plane_curves(
     *,
     analytic: "MicrofacetModel",
     monte_carlo: "SimulatedModel | None" = None,
+    phi_i: float = 0.0,
 ) -> xr.Dataset:
     """Return M00, M10, m10 and DOLP of the models against incidence and signed view.
 
@@ -31,6 +32,8 @@ def plane_curves(
         The analytical model.
     monte_carlo : SimulatedModel, optional
         The simulated one.
+    phi_i : float
+        Azimuth of the plane. [rad]
 
     Returns
     -------
@@ -40,9 +43,10 @@ def plane_curves(
     view = np.concatenate([-theta_s[::-1], theta_s])
     angles = np.meshgrid(theta_i, view, indexing="ij")
     where = angles[0], np.abs(angles[1]), np.where(angles[1] > 0.0, np.pi, 0.0)
-    values = _named("analytic", analytic.brdf(*where))
+    values = _named("analytic", analytic.brdf(*where, phi_i=phi_i))
     if monte_carlo is not None:
-        simulated, error = monte_carlo.brdf(*where), monte_carlo.stderr(*where)
+        simulated = monte_carlo.brdf(*where, phi_i=phi_i)
+        error = monte_carlo.stderr(*where, phi_i=phi_i)
         values |= _named("monte_carlo", simulated) | {
             "monte_carlo_M00_stderr": error[..., 0, 0],
             "monte_carlo_M10_stderr": error[..., 1, 0],

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
@@ -10,6 +10,7 @@ import data_io
 from fitting.estimate import Estimate
 from fitting.report import html
 from fitting.report.figures import histogram_figure, scan_figure
+from fitting.result.misfit import RULE
 from pbrdf import __version__
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ def write_report(
     *,
     inputs: Mapping[str, str] | None = None,
     seconds: Mapping[str, float] | None = None,
+    record: Mapping[str, Any] | None = None,
 ) -> None:
     """Write model.toml, result.nc, the figures and report.html into a folder.
 
@@ -38,6 +40,8 @@ def write_report(
         What went in, for the report: surface, scan, index.
     seconds : mapping of str to float, optional
         Time of what came before the pipeline. [s]
+    record : mapping, optional
+        What it takes to repeat the run, see `fitting.report.record`.
     """
     figures = {
         "surface.png": html.png(histogram_figure(_histograms(result))),
@@ -48,7 +52,7 @@ def write_report(
     for name, image in figures.items():
         (folder / name).write_bytes(image)
     data_io.write_result(result_dataset(result), folder / "result.nc")
-    data_io.write_model(result.model, folder / "model.toml", notes=_notes(result))
+    data_io.write_model(result.model, folder / "model.toml", notes=_notes(result, record))
     times = {**(seconds or {}), **result.seconds}
     page = html.page("Reflectance model", _sections(result, figures, inputs or {}, times))
     (folder / "report.html").write_text(page, encoding="utf-8")
@@ -99,7 +103,7 @@ def _histograms(result: "PipelineResult") -> list:
     return [statistics.height_histogram(), statistics.slope_histogram()]
 
 
-def _notes(result: "PipelineResult") -> dict[str, object]:
+def _notes(result: "PipelineResult", record: Mapping[str, Any] | None) -> dict[str, object]:
     """Return what model.toml remembers beside the model."""
     return {
         "uncertainty": {
@@ -114,7 +118,12 @@ def _notes(result: "PipelineResult") -> dict[str, object]:
             name: _plain(estimate) | {"unit": unit}
             for name, (estimate, unit) in result.statistics.estimates().items()
         },
-        "made_by": {"program": f"pbrdf {__version__}"},
+        "held": result.analytic.held,
+        "misfit": {
+            title: {"verdict": fit.misfit.verdict, "in_words": str(fit.misfit)}
+            for title, fit in fit_columns(result).items()
+        },
+        "made_by": dict(record or {"program": f"pbrdf {__version__}"}),
     }
 
 
@@ -155,11 +164,14 @@ def _sections(
         html.table(
             ("misfit", *fits),
             [
+                ("verdict", *(fit.misfit.verdict for fit in fits.values())),
+                ("size of the misfit", *(str(fit.misfit) for fit in fits.values())),
                 ("chi2 / dof", *(_quality(fit) for fit in fits.values())),
                 ("noise of the scan", *(fit.noise for fit in fits.values())),
                 *_misfit_rows(fits),
             ],
         ),
+        html.paragraph(f"Verdicts: {RULE}."),
         html.figure(
             figures["scan.png"],
             "Scan, analytical curve (dashed) and Monte Carlo with all bounces (full, band: "

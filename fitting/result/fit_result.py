@@ -9,8 +9,11 @@ import numpy as np
 from scipy import stats
 
 from fitting.estimate import Estimate
+from fitting.result.misfit import Misfit, misfit_of
+from fitting.result.tables import held_values, parameter_frame
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
     from fitting.objective.parameters import Parameter
@@ -92,6 +95,36 @@ class FitResult:
     stderr_parts: Mapping[str, Mapping[str, float]]
     anchored_stderr: Mapping[str, float]
     problem: "Problem" = field(repr=False)
+
+    @cached_property
+    def misfit(self) -> Misfit:
+        """How far the readings lie from the curve, in all and by scan and wavelength."""
+        x = np.array(list(self.values.values()))
+        stated = self.n_estimated == 0
+        return misfit_of(
+            self.readings,
+            self.problem.m00().function(x).full().ravel(),
+            share=max(self.dof, 1) / len(self.residuals),
+            stated=stated,
+            hides=stated or self.noise.endswith("absolute"),
+            converged=self.converged,
+        )
+
+    @cached_property
+    def held(self) -> dict[str, Any]:
+        """Values of all that was not free, and the rules of the model.
+
+        What differs from wavelength to wavelength is a mapping by wavelength. [um]
+        """
+        return held_values(self.problem, self.model)
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return a row for each parameter, and for each ratio that is known instead.
+
+        Columns: the parameter without its group, scan and wavelength [um] of the group
+        (empty and nan where it is shared), value, stderr, low, high and unit.
+        """
+        return parameter_frame(self.problem, {**self.estimates, **self.ratios})
 
     @cached_property
     def readings(self) -> "xr.Dataset":
@@ -241,6 +274,11 @@ class FitResult:
         quality = "made to fit" if self.n_estimated else f"p = {self.p_value:.2g}"
         lines.append(f"  chi2 / dof = {self.chi2:.4g} / {self.dof} ({quality})")
         lines.append(f"  noise: {self.noise}")
+        lines.append(f"  misfit: {self.misfit}")
+        groups = self.misfit.groups if len(self.misfit.groups) > 1 else ()
+        for scan, wave, one in groups:
+            where = f"{scan}, {wave:.9g} um" if np.isfinite(wave) else scan
+            lines.append(f"    {where}: {one}")
         lines += [f"  warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
@@ -275,6 +313,8 @@ class FitResult:
             "aic": _number(self.aic),
             "bic": _number(self.bic),
             "noise": self.noise,
+            "misfit": self.misfit.as_dict(),
+            "held": self.held,
             "warnings": list(self.warnings),
         }
 

@@ -1,9 +1,10 @@
 """Options that several commands share, each written once."""
 
 import math
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -43,6 +44,7 @@ __all__ = [
     "incidences",
     "names",
     "numbers",
+    "recorded",
 ]
 
 
@@ -225,6 +227,24 @@ Output = Annotated[
 Force = Annotated[
     bool, typer.Option("--force", help="Replace the output of an earlier run.")
 ]
+
+
+# Options whose unit is part of their name on the command line
+_UNITS = {
+    "wavelength": "wavelength_um",
+    "spacing": "spacing_um",
+    "blocked": "blocked_deg",
+    "source_half_angle": "source_half_angle_deg",
+    "detector_half_angle": "detector_half_angle_deg",
+}
+# What has no part in the numbers, or is recorded with a hash
+_UNRECORDED = {"scans", "scan", "surface", "scene", "output", "force", "workers"}
+
+
+def recorded(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options of a command by the names that say their units."""
+    kept = {name: value for name, value in given.items() if name not in _UNRECORDED}
+    return {_UNITS.get(name, name): value for name, value in kept.items()}
 
 
 def names(text: str) -> tuple[str, ...]:

@@ -1,8 +1,7 @@
 """`pbrdf fit`: bring the analytical model, or a simulated surface, to scans."""
 
-import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +13,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from fitting.models.simulated import SimulatedModel
-    from fitting.result.fit_result import FitResult
     from pbrdf import Material, MicrofacetModel
 
 
@@ -51,7 +49,10 @@ def command(
     ] = None,
     free: options.Free = "specular_gain,diffuse_albedo",
     separate: Annotated[
-        str, typer.Option(help="Those of them that each scan has for itself.")
+        str,
+        typer.Option(
+            help="Those of them that each scan has for itself; or n=wavelength, n=nothing."
+        ),
     ] = "",
     shadowing: options.Shadowing = "smith-correlated",
     wavelength: options.Wavelength = None,
@@ -94,10 +95,13 @@ def command(
     """Fit gains, albedos, index or slope to scans, with errors and correlations.
 
     With --scene the surface is traced once, and everything is fitted to all its bounces.
-    With --output writes a folder with fit.json, model.toml and scan.png.
+    Several wavelengths have gains, albedos and index of their own and share the slope.
+    With --output writes a folder with fit.json, model.toml and scan.png, and of several
+    wavelengths a model each, spectrum.csv and spectrum.png.
 
     Example: pbrdf fit scan.csv --n 1.53 --slope-rms 0.252
     """
+    given = dict(locals())
     from pbrdf.cli.progress import progress_bar
     from pbrdf.cli.reading import read_material, read_scan
     from pbrdf.cli.staging import staged_folder
@@ -146,17 +150,33 @@ def command(
             free=options.names(free),
             solver=solver,
             priors=None if slope_stderr is None else _slope(model, slope_stderr),
-            separate=options.names(separate),
+            separate=_separate(separate),
             mask=(zeros(), blocked_detector(blocked)) if blocked else (zeros(),),
             loss=loss,
             accept=options.names(accept),
         )
     if output is not None:
         with staged_folder(output, force=force) as stage:
-            _write(result, measured, stage)
+            from fitting.report.fit_files import write_fit
+            from fitting.report.record import record_of
+
+            files = {"scan": scans} | ({} if scene is None else {"scene": [scene]})
+            chosen = options.recorded(given)
+            record = record_of(files, command="fit", options=chosen)
+            write_fit(result, measured, stage, record=record)
     typer.echo(result.summary())
     if not result.converged:
         raise typer.Exit(1)
+
+
+def _separate(text: str) -> dict[str, str]:
+    """Return by what each parameter named is told apart.
+
+    >>> _separate("scale, n=wavelength")
+    {'scale': 'scan', 'n': 'wavelength'}
+    """
+    pairs = (word.partition("=") for word in options.names(text))
+    return {name.strip(): by.strip() or "scan" for name, _, by in pairs}
 
 
 def _analytic(
@@ -180,7 +200,7 @@ def _simulated(
     from fitting import SimulatedModel
 
     names = {str(name) for scan in scans for name in scan.data_vars}
-    circular = any(name[0] == "M" and "3" in name[1:3] for name in names)
+    circular = any(name[0] in "Mm" and "3" in name[1:3] for name in names)
     loaded = pbrdf.load_scene(scene)
     material, held = loaded.materials[0], None
     if not {"n", "kappa"} & set(free) and not material.dispersive:
@@ -199,34 +219,3 @@ def _slope(
         msg = "--slope-stderr needs an isotropic surface, got two slopes. Leave it out."
         raise ValueError(msg)
     return {"slope_rms": (slope, stderr)}
-
-
-def _write(result: "FitResult", measured: "Mapping[str, xr.Dataset]", folder: Path) -> None:
-    """Write the numbers, the model and a figure; of several scans one figure each."""
-    import numpy as np
-
-    from data_io import in_plane, write_model
-    from fitting.models.cuts import plane_curves
-    from fitting.report.figures import scan_figure
-
-    text = json.dumps(result.as_dict(), indent=2)
-    (folder / "fit.json").write_text(f"{text}\n", encoding="utf-8")
-    notes = {name: estimate.as_dict() for name, estimate in result.estimates.items()}
-    # Of a simulated surface the analytical model that it corrects
-    analytic = {label: getattr(m, "model", m) for label, m in result.models.items()}
-    first = next(iter(analytic.values()))
-    write_model(first, folder / "model.toml", notes={"uncertainty": notes})
-    zeniths = np.deg2rad(np.arange(0.5, 90.0))
-    for label, scan in measured.items():
-        plane = in_plane(scan)
-        if not plane.sizes["geometry"]:
-            continue
-        model = result.models[label]
-        curves = plane_curves(
-            np.unique(plane.theta_i.values),
-            zeniths,
-            analytic=analytic[label],
-            monte_carlo=model if hasattr(model, "simulation") else None,
-        )
-        name = "scan.png" if len(measured) == 1 else f"{label}.png"
-        scan_figure(plane, curves).savefig(folder / name, dpi=140)

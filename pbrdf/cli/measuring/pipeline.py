@@ -53,7 +53,7 @@ def command(
 
     Example: pbrdf pipeline edge.png scan.csv --um-per-pixel 0.5 --n 1.53
     """
-    begin = perf_counter()
+    given, begin = dict(locals()), perf_counter()
     from pbrdf.cli.progress import StageBars
     from pbrdf.cli.reading import read_material, read_scan, read_surface
     from pbrdf.cli.staging import staged_folder
@@ -83,6 +83,7 @@ def command(
 
         from fitting.pipeline import run_pipeline
         from fitting.readings.masks import blocked_detector, zeros
+        from fitting.report.record import record_of
         from fitting.report.write import write_report
 
         bars = stack.enter_context(StageBars())
@@ -108,7 +109,14 @@ def command(
             "fitted": free,
         }
         begin = perf_counter()
-        write_report(result, stage, inputs=inputs, seconds={"reading": reading})
+        record = record_of(
+            {"surface": surface, "scan": scan},
+            command="pipeline",
+            options=options.recorded(given),
+        )
+        write_report(
+            result, stage, inputs=inputs, seconds={"reading": reading}, record=record
+        )
         writing = perf_counter() - begin
     for line in summary(result):
         typer.echo(line)
@@ -130,8 +138,10 @@ def summary(result: "PipelineResult") -> Iterator[str]:
         yield title
         for name, estimate in fit.estimates.items():
             yield f"  {name:<16} {estimate}"
+        yield from (f"  {name} {estimate}" for name, estimate in fit.ratios.items())
         if not fit.n_estimated:
             yield f"  {'chi2 / dof':<16} {fit.chi2 / fit.dof:.3g}"
+        yield f"  {'misfit':<16} {fit.misfit}"
     if result.unknown:
         yield "What these data cannot tell"
         for text in result.unknown:
