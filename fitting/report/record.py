@@ -11,7 +11,7 @@ __all__ = ["record_of"]
 
 
 def record_of(
-    inputs: Mapping[str, Path | Iterable[Path]],
+    inputs: Mapping[str, Path | Iterable[Path] | None],
     *,
     command: str,
     options: Mapping[str, Any],
@@ -21,7 +21,7 @@ def record_of(
     Parameters
     ----------
     inputs : mapping of str to Path or several of them
-        Files by what they are: surface, scan, scene.
+        Files by what they are: surface, scan, scene; None where there is none.
     command : str
         Name of the command.
     options : mapping of str to value
@@ -30,7 +30,7 @@ def record_of(
     """
     files = []
     for role, paths in inputs.items():
-        for path in (paths,) if isinstance(paths, Path) else paths:
+        for path in (paths,) if isinstance(paths, Path) else paths or ():
             digest = hashlib.sha256(path.read_bytes()).hexdigest()
             files.append({"role": role, "name": path.name, "sha256": digest})
     return {

@@ -238,7 +238,16 @@ _UNITS = {
     "detector_half_angle": "detector_half_angle_deg",
 }
 # What has no part in the numbers, or is recorded with a hash
-_UNRECORDED = {"scans", "scan", "surface", "scene", "output", "force", "workers"}
+_UNRECORDED = {
+    "scans",
+    "scan",
+    "surface",
+    "scene",
+    "material_file",
+    "output",
+    "force",
+    "workers",
+}
 
 
 def recorded(given: Mapping[str, Any]) -> dict[str, Any]:

@@ -160,7 +160,7 @@ def command(
             from fitting.report.fit_files import write_fit
             from fitting.report.record import record_of
 
-            files = {"scan": scans} | ({} if scene is None else {"scene": [scene]})
+            files = {"scan": scans, "scene": scene, "material": material_file}
             chosen = options.recorded(given)
             record = record_of(files, command="fit", options=chosen)
             write_fit(result, measured, stage, record=record)

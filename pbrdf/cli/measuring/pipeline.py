@@ -110,7 +110,7 @@ def command(
         }
         begin = perf_counter()
         record = record_of(
-            {"surface": surface, "scan": scan},
+            {"surface": surface, "scan": scan, "material": material_file},
             command="pipeline",
             options=options.recorded(given),
         )
