@@ -11,7 +11,7 @@ __all__ = ["record_of"]
 
 
 def record_of(
-    inputs: Mapping[str, Path | Iterable[Path] | None],
+    inputs: Mapping[str, str | Path | Iterable[Path] | None],
     *,
     command: str,
     options: Mapping[str, Any],
@@ -21,7 +21,8 @@ def record_of(
     Parameters
     ----------
     inputs : mapping of str to Path or several of them
-        Files by what they are: surface, scan, scene; None where there is none.
+        Files, or an entry of a database, by what they are: surface, scan, scene,
+        material; None where there is none.
     command : str
         Name of the command.
     options : mapping of str to value
@@ -30,9 +31,14 @@ def record_of(
     """
     files = []
     for role, paths in inputs.items():
-        for path in (paths,) if isinstance(paths, Path) else paths or ():
-            digest = hashlib.sha256(path.read_bytes()).hexdigest()
-            files.append({"role": role, "name": path.name, "sha256": digest})
+        for path in (paths,) if isinstance(paths, str | Path) else paths or ():
+            file = Path(path)
+            # An entry of a database has a name and no bytes of its own
+            if not file.is_file():
+                files.append({"role": role, "name": str(path)})
+                continue
+            digest = hashlib.sha256(file.read_bytes()).hexdigest()
+            files.append({"role": role, "name": file.name, "sha256": digest})
     return {
         "program": f"pbrdf {__version__}",
         "command": command,

@@ -189,6 +189,8 @@ def _models(problem: Problem, x: np.ndarray) -> dict[str, object]:
     observations = problem.observations
     waves = observations.geometry.wavelength.round(9)
     several = len(observations.wavelengths) > 1
+    material = getattr(getattr(problem.model, "model", None), "material", None)
+    table = bool(getattr(material, "dispersive", False))
     models = {}
     for index, label in enumerate(observations.labels):
         here = observations.at[observations.scan[observations.at] == index]
@@ -200,7 +202,7 @@ def _models(problem: Problem, x: np.ndarray) -> dict[str, object]:
             for name, column in problem.layout.column.items():
                 values[name] = float(x[column[one]])
             brdf = {name: v for name, v in values.items() if name not in INSTRUMENT}
-            if several and np.isfinite(wave):
+            if (several or table) and np.isfinite(wave):
                 # The index of a table is that of this wavelength
                 present = problem.model.values(observations.geometry)
                 brdf = {k: float(present[k][one]) for k in ("n", "kappa")} | brdf
