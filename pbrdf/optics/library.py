@@ -76,7 +76,7 @@ def get(name: str) -> Material:
     >>> get("bk7").index(0.5876)[0].__round__(4)
     1.5168
     >>> get("water").valid_range
-    (0.2, 20.0)
+    (0.2, 200.0)
     """
     try:
         return _library()[SHORT_NAMES.get(name, name)]

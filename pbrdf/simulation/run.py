@@ -11,6 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from pbrdf.contaminants import Film
+from pbrdf.contaminants.arguments import material_of
 from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.paths.shading import N_LEAKED
 from pbrdf.scene.scene import Scene
@@ -24,6 +25,7 @@ from pbrdf.tracer import arguments
 from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.schedule import gather
+from pbrdf.tracer.thin_films import thin_absorber_warnings
 from pbrdf.tracer.validity import contamination_warnings, lost_ray_warnings
 from pbrdf.tracer.wet_field import WetField, contaminant_materials, media_of
 
@@ -204,7 +206,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
         samples=samples, target=target, workers=arguments.worker_count(workers),
         progress=progress,
     )  # fmt: skip
-    for note in (late := _late_notes(moments, waves)):
+    late = _late_notes(moments, waves) + _thin_films(scene, moments[0], waves)
+    for note in late:
         warnings.warn(note, AccuracyWarning, stacklevel=2)
     notes += late
     return to_dataset(
@@ -241,6 +244,15 @@ def _late_notes(moments: Sequence[Moments], waves: np.ndarray | None) -> list[st
     lost = sum(int(one.counts[:, N_LEAKED].sum()) for one in moments)
     rays = first.plan.n_rays * first.samples * len(first.plan.theta_i) * len(moments)
     return late + lost_ray_warnings(lost, rays)
+
+
+def _thin_films(scene: Scene, moments: Moments, waves: np.ndarray | None) -> list[str]:
+    """Warnings of films whose waves overlap; their thickness is known after laying them."""
+    coverings = [material_of(one.material) for one in scene.contaminants]
+    angles = moments.plan.theta_i
+    return thin_absorber_warnings(
+        moments.reports, coverings, scene.materials, angles, waves
+    )
 
 
 def _realize(

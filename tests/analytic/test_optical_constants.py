@@ -42,7 +42,7 @@ def test_every_entry_has_source_and_range_and_refuses_to_extrapolate(name):
     material = materials.get(name)
     low, high = material.valid_range
     assert material.source
-    assert 0.1 < low < high <= 20.1
+    assert 0.1 < low < high <= 200.0
     n, kappa = material.indices(np.geomspace(low, high, 50)[1:-1])
     assert (n > 0).all()
     assert (kappa >= 0).all()
@@ -66,7 +66,7 @@ def test_formulas_follow_their_definition():
 
 def test_tabulated_material_needs_a_wavelength():
     with pytest.raises(
-        ValueError, match=r"wavelength must be given for water.*0\.2 and 20 um"
+        ValueError, match=r"wavelength must be given for water.*0\.2 and 200 um"
     ):
         materials.get("water").index()
     with pytest.raises(ValueError, match="material must be one of aluminium, bk7, black"):
