@@ -1,5 +1,6 @@
 """From an image file to flattened intensities: 0 in the dark phase, 1 in the bright one."""
 
+import warnings
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -8,11 +9,14 @@ import numpy as np
 from scipy import ndimage
 
 from pbrdf.errors import DataFileError
+from pbrdf.files import file_size
 
 # Smallest picture that can hold an edge worth statistics. [pixels]
 MIN_COLUMNS, MIN_ROWS = 32, 16
 # Pixels nearer to the border than this tell no level; beyond lie 0.02 % of a Gaussian
 RIM_BLURS = 3.5
+# Largest picture, and most pixels that a byte of a compressed one may become
+MOST_PIXELS, MOST_PER_BYTE = 100_000_000, 1000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,8 +81,7 @@ def _decode(path: Path) -> np.ndarray:
     """Return the samples of a single picture that is large enough."""
     from skimage import io
 
-    if not path.is_file():
-        raise DataFileError(path, "expected an image file, found none", "Check the path.")
+    _check_pixels(path, file_size(path))
     try:
         # A decoder that refuses a file leaves it open; this closes it
         with path.open("rb") as stream:
@@ -105,6 +108,29 @@ def _decode(path: Path) -> np.ndarray:
         problem = "expected finite grey levels, got NaN or infinity"
         raise DataFileError(path, problem, "Fill or cut the missing pixels.")
     return image
+
+
+def _check_pixels(path: Path, size: int) -> None:
+    """Refuse a picture that would fill the memory, by what its header says."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with (
+            warnings.catch_warnings(action="ignore"),
+            path.open("rb") as stream,
+            Image.open(stream) as header,
+        ):
+            columns, rows = header.size
+    except Image.DecompressionBombError as error:
+        cure = "The file is damaged or hostile; cut the edge out of it."
+        raise DataFileError(path, f"expected a picture: {error}"[:200], cure) from error
+    except (UnidentifiedImageError, ValueError, OSError, SyntaxError):
+        # The decoder says what is wrong
+        return
+    if columns * rows > min(MOST_PIXELS, MOST_PER_BYTE * size):
+        problem = f"expected a picture, got {columns} x {rows} pixels in {size} bytes"
+        cure = "The file is damaged or hostile; cut the edge out of it."
+        raise DataFileError(path, problem, cure)
 
 
 def _separability(channel: np.ndarray) -> float:

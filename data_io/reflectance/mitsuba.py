@@ -18,9 +18,9 @@ import xarray as xr
 
 from data_io.goniometer.frames import rotation
 from data_io.reflectance.brdf_source import Brdf, from_dataset, from_model
-from data_io.text.write import complete_file
 from pbrdf.analytic import MicrofacetModel
 from pbrdf.errors import real_array, require
+from pbrdf.files import complete_file
 
 # Mitsuba interpolates wrongly between other numbers of wavelengths
 _WAVELENGTH_COUNTS = (1, 3, 4, 5)

@@ -1,6 +1,6 @@
 """The fitted microfacet model as a TOML file that can be loaded again."""
 
-import tomllib
+import math
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from data_io.text.write import complete_file
 from pbrdf.errors import DataFileError
+from pbrdf.files import complete_file, read_toml
 
 if TYPE_CHECKING:
     from pbrdf.analytic import MicrofacetModel
@@ -82,14 +82,14 @@ def read_model(path: str | Path) -> "MicrofacetModel":
     from pbrdf.optics.materials import Material
 
     source = Path(path)
-    document = _load(source)
+    document = read_toml(source)
     names = {_key(name): name for name in _names(MicrofacetModel)}
     table = _table(document, "model", set(names), {"slope_rms"}, source)
     index = _table(document, "material", _MATERIAL_KEYS, {"n"}, source)
     values = {names[key]: _from_file(names[key], value) for key, value in table.items()}
     try:
         return MicrofacetModel(Material(**index), **values)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         problem, _, cure = str(error).partition(". ")
         raise DataFileError(source, problem, cure or "Mend the value.") from error
 
@@ -111,19 +111,9 @@ def _to_file(name: str, value: Any) -> Any:
 
 def _from_file(name: str, value: Any) -> Any:
     if name in _ANGLES:
-        return float(np.deg2rad(value))
+        # What is no number is refused by name by the model
+        return math.radians(value) if isinstance(value, int | float) else value
     return tuple(value) if isinstance(value, list) else value
-
-
-def _load(source: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(source.read_text(encoding="utf-8"))
-    except UnicodeDecodeError as error:
-        problem = "expected a text file, got other bytes"
-        raise DataFileError(source, problem, "A model is a TOML file in UTF-8.") from error
-    except tomllib.TOMLDecodeError as error:
-        problem = f"expected TOML: {error}"
-        raise DataFileError(source, problem, "Mend the line named.") from error
 
 
 def _table(

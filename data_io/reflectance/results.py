@@ -1,6 +1,9 @@
 """Result datasets in netCDF files, complete with their attributes."""
 
+import hashlib
+import io
 import json
+import warnings
 from collections.abc import Hashable
 from pathlib import Path
 from typing import Any
@@ -8,14 +11,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from data_io.reflectance.stored import FAULTS, check_stored, first_line
 from data_io.text.files import read_bytes
-from data_io.text.write import complete_file
 from pbrdf.errors import DataFileError
+from pbrdf.files import complete_file
 
 # Marks an attribute that netCDF cannot hold as it is: truth values, None, lists, mappings
 _JSON = "json:"
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _INT64 = 2**63
+# Attribute that holds the checksum of each variable
+_CHECKSUMS = "pbrdf_checksums"
 
 
 def write_result(dataset: xr.Dataset, path: str | Path) -> None:
@@ -57,8 +63,25 @@ def write_result(dataset: xr.Dataset, path: str | Path) -> None:
         for name, variable in dataset.data_vars.items()
         if variable.ndim and variable.dtype.kind in "fiu"
     }
+    encoded.attrs[_CHECKSUMS] = json.dumps(
+        {str(name): _digest(variable) for name, variable in encoded.variables.items()}
+    )
+    # In memory first: HDF5 takes the interpreter with it when the disk is full
+    content = encoded.to_netcdf(engine="h5netcdf", encoding=encoding)
     with complete_file(path) as temporary:
-        encoded.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+        temporary.write_bytes(content)
+
+
+def _digest(variable: xr.Variable) -> str:
+    """Return a checksum of dimensions, values and attributes."""
+    values = np.ascontiguousarray(variable.to_numpy())
+    text = values.dtype.kind in "OTU"
+    held = values.reshape(-1)
+    content = "\0".join(map(str, held)).encode() if text else held.tobytes()
+    kind = "text" if text else values.dtype.str
+    attrs = sorted((str(key), str(value)) for key, value in variable.attrs.items())
+    head = f"{variable.dims} {values.shape} {kind} {attrs}"
+    return hashlib.sha256(head.encode() + b"\0" + content).hexdigest()
 
 
 def read_result(path: str | Path) -> xr.Dataset:
@@ -69,15 +92,25 @@ def read_result(path: str | Path) -> xr.Dataset:
     DataFileError
         If the file is missing, empty, truncated or no netCDF 4 file.
     """
-    if not read_bytes(path).startswith(_HDF5_MAGIC):
+    content = read_bytes(path)
+    if not content.startswith(_HDF5_MAGIC):
         problem = "expected a netCDF 4 file, the content is something else"
         raise DataFileError(path, problem, "Give a result file (.nc) of this program.")
+    check_stored(path, content)
     try:
         # Names of variables decide nothing: wavelength units are no times
-        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as stored:
+        with (
+            warnings.catch_warnings(action="ignore"),
+            xr.open_dataset(
+                io.BytesIO(content), engine="h5netcdf", decode_times=False
+            ) as stored,
+        ):
             dataset = stored.load()
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
-        problem = f"expected a complete netCDF 4 file, got: {str(error).splitlines()[0]}"
+        _check_digests(path, dataset)
+    except DataFileError:
+        raise
+    except FAULTS as error:
+        problem = f"expected a complete netCDF 4 file, got: {first_line(error)}"
         raise DataFileError(path, problem, "The file is truncated or damaged.") from error
     dataset = dataset.assign_coords(
         {
@@ -86,12 +119,33 @@ def read_result(path: str | Path) -> xr.Dataset:
             if coord.dtype.kind in "OT"
         }
     )
-    dataset.attrs = _decode(dataset.attrs)
-    for name in dataset.variables:
-        dataset[name].attrs = _decode(dataset[name].attrs)
-        dataset[name].encoding = {}
+    try:
+        dataset.attrs = _decode(dataset.attrs)
+        for name in dataset.variables:
+            dataset[name].attrs = _decode(dataset[name].attrs)
+            dataset[name].encoding = {}
+    except FAULTS as error:
+        problem = f"an attribute is no JSON: {first_line(error)}"
+        raise DataFileError(path, problem, "The file is damaged.") from error
     dataset.encoding = {}
     return dataset
+
+
+def _check_digests(path: str | Path, dataset: xr.Dataset) -> None:
+    """Compare what was read with the checksums that were written beside it.
+
+    Files of earlier versions have none.
+    """
+    written = json.loads(dataset.attrs.pop(_CHECKSUMS, "{}"))
+    cure = "The file is damaged; copy it again or repeat the run."
+    for name, variable in dataset.variables.items():
+        if written and written.get(str(name)) != _digest(variable):
+            problem = "the values are not those that were written: its checksum differs"
+            raise DataFileError(path, problem, cure, column=f"variable {name}")
+    missing = sorted(set(written) - set(map(str, dataset.variables)))
+    if missing:
+        problem = "was written and is not there"
+        raise DataFileError(path, problem, cure, column=f"variable {missing[0]}")
 
 
 def _encode(attrs: dict[Any, Any]) -> dict[Any, Any]:

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from pbrdf.errors import DataFileError
+from pbrdf.files import read_bounded
 
 ZIP_MAGIC = b"PK\x03\x04"
 
@@ -24,14 +25,7 @@ class NotAMapError(DataFileError):
 
 def read_bytes(path: str | Path) -> bytes:
     """Return the content of a file that exists and is not empty."""
-    try:
-        content = Path(path).read_bytes()
-    except FileNotFoundError as error:
-        problem = "expected a file, found none of that name"
-        raise DataFileError(path, problem, "Check the path.") from error
-    except OSError as error:
-        problem = f"expected a readable file, got: {error.strerror}"
-        raise DataFileError(path, problem, "Check path and permissions.") from error
+    content = read_bounded(path)
     if not content.strip():
         problem = "expected data, the file is empty"
         raise DataFileError(path, problem, "Export it again from its source.")

@@ -11,6 +11,7 @@ from data_io.topography.height_text import Spacing, build_map, known_steps, read
 from data_io.topography.instruments import read_instrument_map
 from data_io.topography.x3p import read_x3p_map
 from pbrdf.errors import DataFileError
+from pbrdf.files import read_array
 from pbrdf.surface.heightmap import HeightMap
 
 _NPY_MAGIC = b"\x93NUMPY"
@@ -100,11 +101,7 @@ def _refuse_arguments(path: Path, spacing: Spacing | None, unit: str | None) -> 
 
 
 def _read_npy(path: Path, spacing: Spacing | None, unit: str | None) -> HeightMap:
-    try:
-        rows = np.load(path, allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
-        problem = f"expected a complete NumPy array, got: {error}"
-        raise DataFileError(path, problem, "Write it again with numpy.save.") from error
+    rows = read_array(path)
     if rows.dtype.kind not in "fiu":
         problem = f"expected real heights, got dtype {rows.dtype}"
         raise DataFileError(path, problem, "Save a two-dimensional float array.")

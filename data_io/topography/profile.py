@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from data_io.text.files import ZIP_MAGIC, read_bytes
 from data_io.text.text import Line, read_numbers, split_header
-from data_io.text.write import complete_file
 from data_io.topography.columns import (
     Columns,
     column_sizes,
@@ -21,6 +20,7 @@ from data_io.topography.header_fields import profile_step
 from data_io.topography.instruments import INSTRUMENT_SUFFIXES, read_instrument_profile
 from data_io.topography.x3p import read_x3p
 from pbrdf.errors import DataFileError, real_array, require
+from pbrdf.files import complete_file
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)

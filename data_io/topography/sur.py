@@ -18,6 +18,9 @@ _LINES = 112
 _STEP_X, _STEP_Y = slice(120, 124), slice(124, 128)
 # Units of the steps and of the axes, each of x, y and z
 _UNITS = [slice(start, start + 16) for start in range(180, 276, 16)]
+# Heights of instruments compress by less than twenty
+MOST_BYTES = 2**30
+MOST_EXPANSION = 400
 _UTF8_MICRO, _MICRO = "µ".encode(), "µ".encode("latin-1")
 
 
@@ -53,7 +56,13 @@ def _inflated(rest: bytes, start: int) -> bytes:
     lengths = struct.unpack_from(f"<{2 * count}I", rest, start + 4)
     begin = start + 4 + 8 * count
     streams = []
+    most = min(MOST_BYTES, MOST_EXPANSION * len(rest) + 2**20)
     for length in lengths[1::2]:
-        streams.append(zlib.decompress(rest[begin : begin + length]))
+        inflate = zlib.decompressobj()
+        streams.append(inflate.decompress(rest[begin : begin + length], most))
+        most -= len(streams[-1])
+        if inflate.unconsumed_tail or most <= 0:
+            msg = f"its {len(rest)} bytes would grow beyond reason"
+            raise zlib.error(msg)
         begin += length
     return rest[:start] + b"".join(streams)

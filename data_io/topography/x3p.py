@@ -6,19 +6,39 @@ names without their namespace.
 """
 
 import hashlib
+import lzma
 import zipfile
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
+from xml.parsers.expat import ExpatError, ParserCreate
 
 import numpy as np
 
 from data_io.text.files import NotAMapError
 from pbrdf.errors import DataFileError
+from pbrdf.files import file_size
 from pbrdf.surface.heightmap import HeightMap
 
+# What reading an archive raises where it is damaged, encrypted or uses odd methods
+_FAULTS = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    EOFError,
+    NotImplementedError,
+    RuntimeError,
+    OverflowError,
+    LookupError,
+    ValueError,
+    OSError,
+)
+MOST_XML = 256 * 2**20
+MOST_HEIGHTS = 2**30
+# Heights of instruments compress by less than twenty, a map of one height by a thousand
+MOST_EXPANSION = 400
 _METRE = 1e6  # um
 _DTYPES = {"D": "<f8", "F": "<f4", "L": "<i4", "I": "<i2"}
 
@@ -48,13 +68,10 @@ class _Document:
     def __init__(self, path: Path, content: bytes) -> None:
         self.path = path
         try:
-            # Entities are the known attack on XML readers, and x3p has no use for them
-            if b"<!ENTITY" in content:
-                msg = "main.xml declares entities"
-                raise ElementTree.ParseError(msg)
+            _refuse_entities(content)
             self.root = ElementTree.fromstring(content)
-        except ElementTree.ParseError as error:
-            problem = f"expected well-formed XML in main.xml, got: {error}"
+        except (ElementTree.ParseError, ExpatError, LookupError, ValueError) as error:
+            problem = f"expected well-formed XML in main.xml, got: {str(error)[:150]}"
             raise DataFileError(path, problem, "Export the file again.") from error
 
     def find(self, *tags: str) -> ElementTree.Element | None:
@@ -88,6 +105,18 @@ class _Document:
         return DataFileError(self.path, problem, cure, column="main.xml " + "/".join(tags))
 
 
+def _refuse_entities(content: bytes) -> None:
+    """Raise where entities are declared, in any encoding: the known attack on readers."""
+
+    def declared(*_: object) -> None:
+        msg = "main.xml declares entities"
+        raise ValueError(msg)
+
+    parser = ParserCreate()
+    parser.EntityDeclHandler = declared
+    parser.Parse(content, True)
+
+
 def read_x3p(path: str | Path) -> X3p:
     """Read an x3p file of any layout of folders, with or without namespace.
 
@@ -97,12 +126,33 @@ def read_x3p(path: str | Path) -> X3p:
         If the archive is damaged, a checksum differs, or main.xml lacks what is needed.
     """
     path = Path(path)
+    file_size(path)
     try:
         with zipfile.ZipFile(path) as archive:
             return _read_archive(path, archive)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
-        problem = f"expected an x3p (zip) archive, got: {error}"
-        raise DataFileError(path, problem, "The file is truncated or not x3p.") from error
+    except DataFileError:
+        raise
+    except _FAULTS as error:
+        text = str(error)[:150] or type(error).__name__
+        problem = f"expected an x3p (zip) archive, got: {text}"
+        cure = "The file is truncated, encrypted or not x3p."
+        raise DataFileError(path, problem, cure) from error
+
+
+def _member(path: Path, archive: zipfile.ZipFile, name: str, most: int) -> bytes:
+    """Return a file of the archive that does not grow beyond reason."""
+    info = archive.getinfo(name)
+    if (
+        info.file_size > most
+        or info.file_size > MOST_EXPANSION * info.compress_size + 2**20
+    ):
+        problem = (
+            f"{name[:60]} would grow from {info.compress_size} to {info.file_size} bytes"
+        )
+        raise DataFileError(path, problem, "The file is damaged or hostile.")
+    # Its true length may be another than it says
+    with archive.open(info) as stream:
+        return stream.read(info.file_size)
 
 
 def read_x3p_map(path: str | Path) -> HeightMap:
@@ -125,14 +175,14 @@ def _read_archive(path: Path, archive: zipfile.ZipFile) -> X3p:
         problem = "expected main.xml in the archive, found none"
         raise DataFileError(path, problem, "Only files after ISO 25178-72 can be read.")
     folder = PurePosixPath(mains[0]).parent
-    document = _Document(path, archive.read(names[mains[0]]))
+    document = _Document(path, _member(path, archive, names[mains[0]], MOST_XML))
 
     def member(link: str) -> bytes:
         name = str(folder / link.replace("\\", "/").lstrip("/"))
         if name not in names:
             problem = f"expected {name} in the archive, as main.xml says, found none"
             raise DataFileError(path, problem, "Export the file again.")
-        return archive.read(names[name])
+        return _member(path, archive, names[name], MOST_HEIGHTS)
 
     shape = ("Record3", "MatrixDimension")
     nx, ny = (int(document.number(*shape, tag)) for tag in ("SizeX", "SizeY"))

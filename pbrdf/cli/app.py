@@ -5,9 +5,12 @@ Commands import what they need when they run, so that `pbrdf --help` stays quick
 
 import os
 import re
+import signal
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Annotated, Any
@@ -18,11 +21,22 @@ from pbrdf import __version__
 from pbrdf.cli import measuring, predicting, showing
 from pbrdf.cli.progress import Talk, talk
 from pbrdf.cli.wording import in_options, options_of
+from pbrdf.files.writing import FULL
 
 __all__ = ["app", "main"]
 
+_ROOM = "Make room, or write elsewhere."
+_MEMORY = "Take fewer bins, angles or wavelengths at once (--n-theta, --n-dphi, --stokes)."
+
+FAILED = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
+TERMINATED = 143
+
+
+class TerminatedError(BaseException):
+    """The process was asked to end; what is half written is cleared away."""
+
 
 app = typer.Typer(
     name="pbrdf",
@@ -93,7 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     talk(Talk.NORMAL)
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), _ending_in_order():
         warnings.showwarning = _one_line_warning
         try:
             code = app(
@@ -101,19 +115,45 @@ def main(arguments: Sequence[str] | None = None) -> int:
             )
         except typer.TyperException as error:
             return _fail(error, _usage(error, arguments))
-        except (ValueError, OSError) as error:
+        except OSError as error:
+            if error.errno in FULL:
+                return _fail(error, f"{error.filename}: {error.strerror}. {_ROOM}", FAILED)
+            return _fail(error, _sentence(error))
+        except MemoryError as error:
+            return _fail(error, f"out of memory. {_MEMORY}", FAILED)
+        except ValueError as error:
             return _fail(error, _in_words_of_the_command(_sentence(error), arguments))
         except (KeyboardInterrupt, typer.Abort):
             typer.echo("Interrupted; nothing was written.", err=True)
             return INTERRUPTED
+        except TerminatedError:
+            typer.echo("Terminated; nothing was written.", err=True)
+            return TERMINATED
     return code if isinstance(code, int) else 0
 
 
-def _fail(error: Exception, message: str) -> int:
+@contextmanager
+def _ending_in_order() -> Iterator[None]:
+    """Turn SIGTERM into an exception, so that what is half written is cleared away."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(*_: object) -> None:
+        raise TerminatedError
+
+    earlier = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, earlier)
+
+
+def _fail(error: Exception, message: str, code: int = BAD_INPUT) -> int:
     if os.environ.get("PBRDF_TRACEBACK") or talk() is Talk.VERBOSE:
         raise error
     typer.echo(f"error: {message}", err=True)
-    return BAD_INPUT
+    return code
 
 
 def _command_of(arguments: Sequence[str]) -> str | None:

@@ -1,10 +1,10 @@
-"""Output that appears whole or not at all."""
+"""Output that appears whole or not at all, and never in place of a stranger's files."""
 
-import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from pbrdf.files import complete_file, complete_folder
 
 __all__ = ["staged_file", "staged_folder"]
 
@@ -26,17 +26,12 @@ def staged_folder(target: Path, *, force: bool = False) -> Iterator[Path]:
     Raises
     ------
     ValueError
-        If `target` exists and may not be replaced. Raised before any work is done.
+        If `target` exists and may not be replaced; before any work is done where it can be
+        known by then.
     """
-    _check_parent(target)
-    _check_free(target, force=force)
-    stage = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    try:
-        stage.chmod(0o755)
+    _check_ours(target)
+    with complete_folder(target, replace=force) as stage:
         yield stage
-        _replace_folder(stage, target)
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
 
 
 @contextmanager
@@ -48,31 +43,11 @@ def staged_file(target: Path, *, force: bool = False) -> Iterator[Path]:
     ValueError
         If `target` is a folder, or exists and `force` is not given.
     """
-    _check_parent(target)
-    if target.is_dir():
-        msg = f"output must be a file, got the folder {target}. Name a file in it."
-        raise ValueError(msg)
-    if target.exists() and not force:
-        msg = f"output must be new, got {target}, which exists. Use --force to replace it."
-        raise ValueError(msg)
-    with tempfile.TemporaryDirectory(
-        prefix=f".{target.stem}-", dir=target.parent
-    ) as folder:
-        # The suffix stays: writers choose their format by it
-        stage = Path(folder) / target.name
+    with complete_file(target, replace=force) as stage:
         yield stage
-        stage.replace(target)
 
 
-def _check_parent(target: Path) -> None:
-    if not target.parent.is_dir():
-        msg = (
-            f"output must lie in a folder that exists, got {target}. Make the folder first."
-        )
-        raise ValueError(msg)
-
-
-def _check_free(target: Path, *, force: bool) -> None:
+def _check_ours(target: Path) -> None:
     if not target.exists() or (target.is_dir() and not any(target.iterdir())):
         return
     if not target.is_dir() or not (target / MARK).is_file():
@@ -81,17 +56,3 @@ def _check_free(target: Path, *, force: bool) -> None:
             "which is neither. Name another."
         )
         raise ValueError(msg)
-    if not force:
-        msg = f"output must be new, got {target}, which exists. Use --force to replace it."
-        raise ValueError(msg)
-
-
-def _replace_folder(stage: Path, target: Path) -> None:
-    if not target.exists():
-        stage.rename(target)
-        return
-    # Two renames: at no moment does the target hold half of the old and half of the new
-    old = Path(tempfile.mkdtemp(prefix=f".{target.name}-old-", dir=target.parent))
-    target.rename(old / target.name)
-    stage.rename(target)
-    shutil.rmtree(old)

@@ -4,9 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pbrdf.errors import DataFileError
+from pbrdf.files import companion, read_array, read_toml
 from pbrdf.optics.materials import Material
 from pbrdf.scene.contaminant_tables import read_contaminant
 from pbrdf.scene.scene import Scene
@@ -16,7 +15,6 @@ from pbrdf.scene.toml_tables import (
     check_present,
     kind_of,
     read_material,
-    read_toml,
     required,
 )
 from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, Surface
@@ -56,7 +54,7 @@ def load_scene(path: str | Path) -> Scene:
         )
     except DataFileError:
         raise
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError, IndexError) as error:
         problem = str(error).rstrip(".")
         raise DataFileError(source, problem, "See the documented keys.") from error
 
@@ -98,14 +96,7 @@ def _read_surface(table: dict[str, Any], source: Path) -> Surface:
     _check_type(table, "file", str, "Name a .npy file.", source)
     heights = table.get("heights_um")
     if heights is None:
-        file = source.parent / table["file"]
-        try:
-            heights = np.load(file, allow_pickle=False)
-        except (OSError, ValueError) as error:
-            raise DataFileError(
-                source, f"[surface]: file {table['file']!r} cannot be read ({error})",
-                "Give a .npy file of heights [um], x first.",
-            ) from error  # fmt: skip
+        heights = read_array(companion(source, table["file"], "[surface]"))
     return HeightMap(
         heights,
         _pair(table["spacing_um"]),

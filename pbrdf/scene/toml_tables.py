@@ -1,6 +1,5 @@
 """Tables of TOML files: keys that are known, values of the right kind, materials."""
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -24,19 +23,6 @@ MATERIAL_KEYS = {
     "file",
     "absorbs_all",
 }
-
-
-def read_toml(source: Path) -> dict[str, Any]:
-    """Parse a TOML file, or raise a DataFileError that says what is wrong with it."""
-    try:
-        return tomllib.loads(source.read_text(encoding="utf-8"))
-    except OSError as error:
-        problem, cure = f"cannot be read ({error.strerror})", "Check the path."
-    except UnicodeDecodeError:
-        problem, cure = "is not a text file", "A scene is a TOML file in UTF-8."
-    except tomllib.TOMLDecodeError as error:
-        problem, cure = f"is not valid TOML: {error}", "Mend the line named."
-    raise DataFileError(source, problem, cure)
 
 
 def required(document: Mapping[str, Any], name: str, source: Path) -> dict[str, Any]:

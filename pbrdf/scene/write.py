@@ -1,5 +1,7 @@
 """Scenes into TOML files."""
 
+import hashlib
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -7,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 import tomli_w
 
+from pbrdf.files import complete_file
 from pbrdf.optics.materials import Material
 from pbrdf.scene.contaminant_tables import contaminant_table
 from pbrdf.scene.toml_tables import material_table, plain
@@ -44,9 +47,8 @@ def write_scene(
     target: Path | None,
 ) -> str:
     """Write a scene as TOML text, and to `target` if given; see `Scene.to_toml`."""
-    heights_file = None if target is None else target.with_suffix(".npy")
     document: dict[str, Any] = {
-        "surface": _surface_table(surface, heights_file),
+        "surface": _surface_table(surface, target),
         "substrate": (
             material_table(substrate)
             if isinstance(substrate, Material)
@@ -57,13 +59,12 @@ def write_scene(
         document["contaminants"] = [contaminant_table(one) for one in contaminants]
     text = tomli_w.dumps(document)
     if target is not None:
-        temporary = target.with_name(target.name + ".part")
-        temporary.write_text(text, encoding="utf-8")
-        temporary.replace(target)
+        with complete_file(target) as stage:
+            stage.write_text(text, encoding="utf-8")
     return text
 
 
-def _surface_table(surface: Surface, file: Path | None) -> dict[str, Any]:
+def _surface_table(surface: Surface, target: Path | None) -> dict[str, Any]:
     if isinstance(surface, GaussianSurface):
         table = {
             "type": "gaussian",
@@ -96,12 +97,26 @@ def _surface_table(surface: Surface, file: Path | None) -> dict[str, Any]:
         table["labels"] = surface.labels.tolist()
     if surface.heights.size <= INLINE_NODES:
         return table | {"heights_um": surface.heights.tolist()}
-    if file is None:
+    if target is None:
         msg = (
             f"path must be given for a map of {surface.heights.size} nodes, got None. "
             "Its heights are written beside the TOML file."
         )
         raise ValueError(msg)
-    with file.open("wb") as stream:
-        np.save(stream, surface.heights)
-    return table | {"file": file.name}
+    return table | {"file": _write_heights(surface.heights, target).name}
+
+
+def _write_heights(heights: np.ndarray, target: Path) -> Path:
+    """Write heights beside a scene, under a name that tells what is in them.
+
+    So no other file is overwritten, and a scene never finds heights that are not its own:
+    they are there before the scene's file is, and an earlier scene keeps its own.
+    """
+    content = io.BytesIO()
+    np.save(content, heights)
+    digest = hashlib.sha256(content.getbuffer()).hexdigest()[:12]
+    file = target.with_name(f"{target.stem}-{digest}.npy")
+    if not file.exists():
+        with complete_file(file) as stage:
+            stage.write_bytes(content.getbuffer())
+    return file

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from data_io.goniometer.scan import CONVENTIONS, QUANTITIES, STDERR
-from data_io.text.write import complete_file
+from pbrdf.files import complete_file
 
 __all__ = ["NOTES", "write_csv"]
 

@@ -1,0 +1,96 @@
+"""What an HDF5 file may hold before it is believed: no links outwards, bombs or holes."""
+
+import io
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from pbrdf.errors import DataFileError
+
+__all__ = ["FAULTS", "check_stored", "first_line"]
+
+# What the libraries below raise of damaged files
+FAULTS = (
+    OSError,
+    ValueError,
+    LookupError,
+    RuntimeError,
+    TypeError,
+    AttributeError,
+    AssertionError,
+    MemoryError,
+    OverflowError,
+    RecursionError,
+    EOFError,
+)
+# A result may be so much larger than its file; noise compresses by less than two
+MOST_EXPANSION = 2000
+MOST_BYTES = 16 * 2**30
+HOSTILE = "A result holds its own data; do not read it from a stranger."
+DAMAGED = "The file is damaged; copy it again or repeat the run."
+
+
+def first_line(error: BaseException) -> str:
+    """Return the first line of an error, not too long."""
+    text = str(error).strip()
+    return text.splitlines()[0][:150] if text else type(error).__name__
+
+
+def check_stored(path: str | Path, content: bytes) -> None:
+    """Refuse a file whose data lie elsewhere, are missing, or would fill the memory.
+
+    Raises
+    ------
+    DataFileError
+        Naming the variable.
+    """
+    try:
+        with h5py.File(io.BytesIO(content), "r") as file:
+            _check_group(path, file, len(content))
+    except DataFileError:
+        raise
+    except FAULTS as error:
+        problem = f"expected a complete netCDF 4 file, got: {first_line(error)}"
+        raise DataFileError(path, problem, "The file is truncated or damaged.") from error
+
+
+def _check_group(path: str | Path, group: h5py.Group, size: int, depth: int = 0) -> None:
+    for name in group:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            problem = f"{name[:80]} is a link to somewhere else"
+            raise DataFileError(path, problem, HOSTILE)
+        item = group[name]
+        if isinstance(item, h5py.Group):
+            # A group can hold itself
+            if depth > 8:
+                raise DataFileError(path, "its groups nest too deeply", HOSTILE)
+            _check_group(path, item, size, depth + 1)
+        elif isinstance(item, h5py.Dataset):
+            _check_dataset(path, name, item, size)
+
+
+def _check_dataset(path: str | Path, name: str, item: h5py.Dataset, size: int) -> None:
+    place = f"variable {name[:80]}"
+    if item.id.get_create_plist().get_external_count():
+        problem = "its data lie in another file"
+        raise DataFileError(path, problem, HOSTILE, column=place)
+    if item.is_virtual:
+        problem = "it is put together from other files"
+        raise DataFileError(path, problem, HOSTILE, column=place)
+    if item.nbytes > min(MOST_BYTES, MOST_EXPANSION * size):
+        problem = f"it would take {item.nbytes / 2**20:.0f} MiB of a file of {size} bytes"
+        raise DataFileError(path, problem, DAMAGED, column=place)
+    if item.chunks is None or not item.size:
+        return
+    expected = 1
+    for side, chunk in zip(item.shape, item.chunks, strict=True):
+        expected *= -(-side // chunk)
+    # A damaged index puts pieces outside, and what they should fill is read as missing
+    places = {
+        item.id.get_chunk_info(k).chunk_offset for k in range(item.id.get_num_chunks())
+    }
+    inside = sum(all(np.less(offset, item.shape)) for offset in places)
+    if inside != expected:
+        problem = f"it holds {inside} of {expected} pieces of its data"
+        raise DataFileError(path, problem, DAMAGED, column=place)
