@@ -8,6 +8,20 @@ import numpy as np
 import numpy.typing as npt
 
 
+def shortened(text: str, most: int) -> str:
+    """Return a text of at most so many signs, its middle left out where it is longer.
+
+    Examples
+    --------
+    >>> shortened("expected a number, got " + 1000 * "7", 40)
+    'expected a number, got 7777 ... 77777777'
+    """
+    if len(text) <= most:
+        return text
+    tail = (most - 5) // 4
+    return f"{text[: most - 5 - tail]} ... {text[-tail:]}"
+
+
 class DataFileError(ValueError):
     """A file that cannot be used, with the place of the fault and how to mend it.
 
@@ -44,8 +58,8 @@ class DataFileError(ValueError):
         if line is not None:
             place += f" line {line}"
         if column is not None:
-            place += f", column {column}"
-        super().__init__(f"{place}: {problem}. {cure}")
+            place += f", column {shortened(column, 60)}"
+        super().__init__(f"{place}: {shortened(problem, 220)}. {shortened(cure, 400)}")
         self.path = Path(path)
         self.line = line
         self.column = column

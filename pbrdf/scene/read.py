@@ -96,7 +96,13 @@ def _read_surface(table: dict[str, Any], source: Path) -> Surface:
     _check_type(table, "file", str, "Name a .npy file.", source)
     heights = table.get("heights_um")
     if heights is None:
-        heights = read_array(companion(source, table["file"], "[surface]"))
+        try:
+            heights = read_array(companion(source, table["file"], "[surface]"))
+        except DataFileError as error:
+            if error.path == source:
+                raise
+            problem, _, cure = str(error).partition(". ")
+            raise DataFileError(source, f"[surface]: {problem}", cure) from error
     return HeightMap(
         heights,
         _pair(table["spacing_um"]),

@@ -75,7 +75,8 @@ class Scene:
     def to_toml(self, path: str | Path | None = None) -> str:
         """TOML text of the scene, also written to `path` if given.
 
-        The heights of a map beyond 4096 nodes go to `<path>.npy` beside the file.
+        The heights of a map beyond 4096 nodes go to a .npy file beside it, named after what
+        they are.
 
         Raises
         ------

@@ -49,7 +49,7 @@ def test_height_map_round_trip_inline_or_beside(shape, periodic, tmp_path):
     assert again.surface.spacing == (0.1, 0.3)
     assert again.surface.periodic is periodic
     assert again.substrate.name == "bk7"
-    assert (tmp_path / "scene.npy").exists() == (heights.size > 4096)
+    assert bool(list(tmp_path.glob("scene-*.npy"))) == (heights.size > 4096)
 
 
 def test_tabulated_material_round_trip(tmp_path):
@@ -101,7 +101,7 @@ GLASS = "[substrate]\nn = 1.5\n"
         ('[surface]\ntype = "height_map"\nspacing_um = 1\n' + GLASS, "Give exactly one"),
         (
             '[surface]\ntype = "height_map"\nfile = "gone.npy"\nspacing_um = 1\n' + GLASS,
-            "'gone.npy' cannot be read",
+            "gone.npy: expected a file, found none",
         ),
         ('[surface]\ntype = "height_map"\nfile = 5\nspacing_um = 1\n' + GLASS, "file"),
         (
@@ -121,7 +121,7 @@ def test_wrong_files_are_told_what_is_wrong(text, message, tmp_path):
 
 
 def test_missing_and_binary_files(tmp_path):
-    with pytest.raises(DataFileError, match="cannot be read"):
+    with pytest.raises(DataFileError, match="found none of that name"):
         load_scene(tmp_path / "none.toml")
     (tmp_path / "binary.toml").write_bytes(bytes(range(128, 256)))
     with pytest.raises(DataFileError, match="not a text file"):

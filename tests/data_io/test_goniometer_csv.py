@@ -299,7 +299,7 @@ def test_a_failure_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
     monkeypatch.undo()
     assert out.read_text() == "old"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out.csv", "run07.csv"]
-    with pytest.raises(ValueError, match="existing folder"):
+    with pytest.raises(ValueError, match="folder that exists"):
         write_goniometer(scan, tmp_path / "absent" / "out.csv")
 
 

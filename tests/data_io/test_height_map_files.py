@@ -227,7 +227,7 @@ def test_x3p_checksums_are_checked(tmp_path):
             {},
             "line 13: .*line 3 has the same x and y",
         ),
-        ("map.npy", b"\x93NUMPY\x01\x00", {"spacing": 1.0}, "complete NumPy array"),
+        ("map.npy", b"\x93NUMPY\x01\x00", {"spacing": 1.0}, "expected a .npy file"),
         ("map.npy", b"text", {"spacing": 1.0}, "does not start like one"),
         ("map.x3p", b"PK\x03\x04 truncated", {}, "expected an x3p"),
         ("map.x3p", b"PK\x03\x04", {"spacing": 1.0}, "Leave the arguments out"),

@@ -21,7 +21,7 @@ from data_io.goniometer.tables.names import (
     target_of,
 )
 from data_io.goniometer.tables.table import RawTable
-from pbrdf.errors import DataFileError
+from pbrdf.errors import DataFileError, shortened
 from pbrdf.optics.published.columns import Column
 
 __all__ = ["Columns", "read_columns"]
@@ -126,7 +126,9 @@ def _meanings(path: Path, table: RawTable, declared: Declared) -> list[Meaning]:
     if unknown or without_unit:
         raise _unknown(path, table, unknown, without_unit)
     if text:
-        msg = f"{path.name}: columns of text are left out: {', '.join(text)}."
+        msg = (
+            f"{path.name}: columns of text are left out: {shortened(', '.join(text), 200)}."
+        )
         warnings.warn(msg, ConventionWarning, stacklevel=5)
     return found
 
