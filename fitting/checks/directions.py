@@ -15,6 +15,8 @@ _OBLIQUE = np.radians(8.0)
 # the mirror image of the specular direction lies
 _BRIGHTER, _FAINTLY, _NEAR = 1.3, 1.02, np.radians(25.0)
 _SAME = np.radians(0.25)
+# Readings to interpolate between
+_APART = np.radians(6.0)
 # Departure from reciprocity beyond which it is not noise or an aperture. [1]
 _UNEQUAL = 0.15
 
@@ -90,8 +92,8 @@ def _brighter_back(curve: Curve) -> tuple[float, float]:
         return float("nan"), float("nan")
     opposite = np.interp(zenith[inside], view[forward], value[forward])
     back, error = value[backward][inside], np.nan_to_num(stderr[backward][inside])
-    if opposite.max() >= back.max() or opposite.max() <= 0:
-        return min(back.max() / max(opposite.max(), 1e-300), 1.0), float("nan")
+    if opposite.max() >= back.max():
+        return 1.0, float("nan")
     peak = int(np.argmax(back))
     ahead = max(opposite[peak], 1e-3 * back[peak])
     if back[peak] - 5.0 * error[peak] <= ahead:
@@ -145,6 +147,8 @@ def _exchanged(a: Curve, b: Curve) -> list[tuple[float, float, float]]:
     )
     if not same_wave or b.theta_i - a.theta_i < np.radians(5.0):
         return []
+    if a.is_planar and b.is_planar:
+        return _exchanged_in_plane(a, b)
     found = []
     for k in np.flatnonzero(np.abs(a.theta_s - b.theta_i) < _SAME):
         turn = np.cos(b.dphi - a.dphi[k])
@@ -164,3 +168,27 @@ def _exchanged(a: Curve, b: Curve) -> list[tuple[float, float, float]]:
                     )
                 )
     return found
+
+
+def _exchanged_in_plane(a: Curve, b: Curve) -> list[tuple[float, float, float]]:
+    """Return the same of curves in plane, interpolated between neighbouring readings."""
+    found = []
+    cosines = float(np.cos(b.theta_i) / np.cos(a.theta_i))
+    for side in (-1.0, 1.0):
+        first, second = _read_at(a, side * b.theta_i), _read_at(b, side * a.theta_i)
+        if first[0] > 0 and second[0] > 0:
+            relative = np.hypot(first[1] / first[0], second[1] / second[0])
+            found.append((first[0] / second[0], cosines, float(np.nan_to_num(relative))))
+    return found
+
+
+def _read_at(curve: Curve, view: float) -> tuple[float, float]:
+    """Return value and error at a view angle between two readings; NaN outside or apart."""
+    views, values, errors = curve.in_plane()
+    k = int(np.clip(np.searchsorted(views, view), 1, max(views.size - 1, 1)))
+    if views.size < 2 or not views[k - 1] - _SAME <= view <= views[k] + _SAME:
+        return float("nan"), float("nan")
+    if views[k] - views[k - 1] > _APART:
+        return float("nan"), float("nan")
+    value = float(np.interp(view, views, values))
+    return value, float(np.interp(view, views, errors))

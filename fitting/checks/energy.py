@@ -14,6 +14,7 @@ _TOLERANCE = 1.05
 # Readings further apart than this leave what lies between unknown
 _GAP = np.radians(25.0)
 _DARK = 1e-4
+_RESOLVED = 0.6
 
 
 def check_energy(curves: Sequence[Curve]) -> list[Finding]:
@@ -42,12 +43,14 @@ def check_energy(curves: Sequence[Curve]) -> list[Finding]:
             )
         ]  # fmt: skip
     middles = [entry[1] for entry in found]
-    if max(middles) > _TOLERANCE:
+    # A lobe that the readings do not resolve has no estimate worth the name
+    resolved = [middle for low, middle, _ in found if low > _RESOLVED * middle]
+    if max(resolved, default=0.0) > _TOLERANCE:
         return [
             Finding(
                 name="energy", severity="warning",
-                what=f"the readings integrate to a reflectance of about {max(middles):.3g} "
-                f"if the lobe is as wide across the plane as in it, at least {low:.3g}",
+                what=f"the readings integrate to a reflectance of about "
+                f"{max(resolved):.3g} if the lobe is as wide across the plane as in it, at least {low:.3g}",
                 suspects="too few readings in a narrow lobe, or values in another unit",
                 cure="Compare with a measured total reflectance; --quantity says the unit.",
             )
@@ -65,7 +68,7 @@ def check_energy(curves: Sequence[Curve]) -> list[Finding]:
         Finding(
             name="energy", severity="note",
             what=f"the readings integrate to a reflectance of {min(middles):.2g} to "
-            f"{max(middles):.2g}",
+            f"{max(middles):.2g}, at least {low:.2g}",
         )
     ]  # fmt: skip
 
