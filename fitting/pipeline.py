@@ -24,6 +24,7 @@ from fitting.statistics.result import SurfaceStatistics
 from fitting.statistics.surface import surface_statistics
 from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene
 from pbrdf.errors import check_seed
+from pbrdf.validity import judge, roughness_of
 
 if TYPE_CHECKING:
     from data_io import Profile
@@ -182,7 +183,11 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
             analytic=analytic.model,
             monte_carlo=monte_carlo.model,
         ),
-        unknown=(*_unknown(measurement, statistics), *analytic.warnings),
+        unknown=(
+            *_unknown(measurement, statistics),
+            *_beyond_optics(measurement, statistics),
+            *analytic.warnings,
+        ),
         seconds=clock.seconds,
     )
 
@@ -288,6 +293,17 @@ def _unknown(measurement: xr.Dataset, statistics: SurfaceStatistics) -> Iterator
         yield "One incidence was measured; others are predictions."
     if not np.isfinite(statistics.slope_rms.stderr):
         yield "The surface does not determine the slope; it was fitted to the scan instead."
+
+
+def _beyond_optics(
+    measurement: xr.Dataset, statistics: SurfaceStatistics
+) -> tuple[str, ...]:
+    """Name where geometric optics fails on this surface at the wavelength of the scan."""
+    wavelength = _wavelength(measurement)
+    if wavelength is None:
+        return ()
+    rough = roughness_of(random_surface(statistics, statistics.slope_rms.value))
+    return judge(rough, np.unique(measurement.theta_i.values), wavelength).notes
 
 
 @dataclass

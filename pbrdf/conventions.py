@@ -59,6 +59,25 @@ RESULT_VARIABLES: dict[str, Variable] = {
         "1", "share of the rays that left a finite map sideways, not counted",
         ("theta_i", "phi_i"),
     ),
+    "coherent_share": Variable(
+        "1", "share of the light that stays in a coherent specular beam",
+        ("theta_i", "wavelength"),
+    ),
+    "curvature_number": Variable(
+        "1", "k R cos(theta_i)^3, R the typical radius of curvature: inverse of the error "
+        "of the tangent plane", ("theta_i", "wavelength"),
+    ),
+    "corr_length_in_waves": Variable(
+        "1", "correlation length of the surface over the wavelength", ("wavelength",)
+    ),
+    "cell_in_waves": Variable("1", "grid step over the wavelength", ("wavelength",)),
+    "size_parameter": Variable(
+        "1", "least size parameter 2 pi R / wavelength of drops and spheres",
+        ("wavelength",),
+    ),
+    "film_field": Variable(
+        "1", "field that comes back through a film and interferes", ("wavelength",)
+    ),
     "theta_i": Variable("rad", "zenith angle of the source", ("theta_i",)),
     "phi_i": Variable("rad", "azimuth of the source", ("phi_i",)),
     "theta_s": Variable("rad", "zenith of the detector, bin centre", ("theta_s",)),

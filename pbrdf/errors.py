@@ -96,8 +96,8 @@ def real_array(name: str, values: npt.ArrayLike, cure: str = "") -> np.ndarray:
         hidden, values = np.ma.getmaskarray(values), values.data
     plain = np.asanyarray(values) if not isinstance(values, np.ndarray) else values
     if plain.dtype.kind in "cb":
-        kind = "complex" if plain.dtype.kind == "c" else "truth"
-        msg = f"{name} must be real numbers, got {kind} values. {cure}"
+        wanted = "real, got complex" if plain.dtype.kind == "c" else "numbers, got truth"
+        msg = f"{name} must be {wanted} values. {cure}"
         raise TypeError(msg.strip())
     try:
         array = np.asarray(plain, dtype=np.float64)

@@ -52,7 +52,13 @@ def write_model(
     if not isinstance(model.slope_distribution, str):
         msg = "slope_distribution must be a name to be written, got a table of slopes."
         raise ValueError(msg)
-    table = {_key(name): _to_file(name, getattr(model, name)) for name in _names(model)}
+    given = {name: getattr(model, name) for name in _names(model)}
+    # TOML has no word for what is not known
+    table = {
+        _key(name): _to_file(name, value)
+        for name, value in given.items()
+        if value is not None
+    }
     index: dict[str, Any] = {} if material.name is None else {"name": material.name}
     index |= {"n": float(material.n), "kappa": float(material.kappa)}
     text = tomli_w.dumps({"model": table, "material": index, **(notes or {})})
@@ -100,6 +106,8 @@ def _names(model: Any) -> list[str]:
 
 
 def _key(name: str) -> str:
+    if name == "height_rms":
+        return "height_rms_um"
     return f"{name}_deg" if name in _ANGLES else name
 
 

@@ -1,6 +1,7 @@
 """Polarised measured BSDF files (.pbsdf) in: of this package, of Mitsuba and of KAIST.
 
-The layout and the frames are those of `data_io.reflectance.mitsuba`, which writes them.
+The layout is that of `data_io.reflectance.mitsuba`, which writes them, the frames are those
+of `data_io.reflectance.half_vector`.
 """
 
 import struct
@@ -12,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from data_io.goniometer.scan import CONVENTIONS, ELEMENTS, ConventionWarning
-from data_io.reflectance.mitsuba import (
+from data_io.reflectance.half_vector import (
     HalfVectorGrid,
     file_frames,
     half_vector_geometry,
@@ -21,7 +22,7 @@ from data_io.reflectance.mitsuba import (
 from data_io.text.files import read_bytes
 from pbrdf.errors import DataFileError
 
-__all__ = ["MAGIC", "read_pbsdf"]
+__all__ = ["MAGIC", "read_pbsdf", "tensor_fields"]
 
 MAGIC = b"tensor_file\0"
 # Types of fields by their code in the file
@@ -57,7 +58,7 @@ def read_pbsdf(path: str | Path) -> xr.Dataset:
     """
     path = Path(path)
     content = read_bytes(path)
-    fields = _fields(path, content)
+    fields = tensor_fields(path, content)
     missing = [name for name in _NEEDED if name not in fields]
     if missing:
         problem = f"expected the fields {', '.join(_NEEDED)}, lacks {', '.join(missing)}"
@@ -109,7 +110,7 @@ def read_pbsdf(path: str | Path) -> xr.Dataset:
 
 def _scan(grid: HalfVectorGrid, waves: np.ndarray, table: np.ndarray) -> xr.Dataset:
     """Return the nodes of a table (phi_d, theta_d, theta_h, ...) in the conventions."""
-    geometry = half_vector_geometry(grid)
+    geometry = half_vector_geometry(*np.meshgrid(*grid, indexing="ij"))
     theta_i, theta_s, dphi = zeniths(geometry)
     into, out_of = file_frames(geometry)
     # The frames are rotations: turning back is the transposed matrix
@@ -141,7 +142,7 @@ def _distinct(grid: HalfVectorGrid) -> np.ndarray:
     return first | ((theta_d > 1e-6) & (theta_h > 1e-6) & ~again)
 
 
-def _fields(path: Path, content: bytes) -> dict[str, np.ndarray]:
+def tensor_fields(path: Path, content: bytes) -> dict[str, np.ndarray]:
     """Return the arrays of a tensor file, each within the file."""
     if content[: len(MAGIC)] != MAGIC:
         problem = f"expected a tensor file, got {content[:12]!r}"

@@ -102,7 +102,7 @@ class AnalyticModel:
 
     def _numbers(self) -> dict[str, float]:
         """Return the model's other numbers."""
-        skip = {"material", "slope_rms", *_RULES}
+        skip = {"material", "slope_rms", "height_rms", *_RULES}
         numbers = {
             field.name: getattr(self.model, field.name)
             for field in fields(self.model)

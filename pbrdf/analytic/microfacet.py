@@ -1,6 +1,7 @@
 """The analytical model: Fresnel facets, slope distribution, shadowing, diffuse terms."""
 
 import os
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from math import nan
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pbrdf.analytic.geometry import flat_geometry
+from pbrdf.analytic.geometry import checked_zenith, flat_geometry
 from pbrdf.analytic.slope_table import SlopeTable
 from pbrdf.analytic.tables import (
     GRAZING_FORMS,
@@ -18,13 +19,14 @@ from pbrdf.analytic.tables import (
     VOLUME_FORMS,
     code_of,
 )
-from pbrdf.errors import one_number, require
+from pbrdf.errors import AccuracyWarning, one_number, require
 from pbrdf.kernels.microfacet import microfacet as kernel
 from pbrdf.kernels.microfacet.shadowing import Shadowing
 from pbrdf.kernels.microfacet.slopes import GAUSSIAN, Roughness, slope_norm
 from pbrdf.kernels.optics.volume import Diffuse
 from pbrdf.optics import library
 from pbrdf.optics.materials import Material
+from pbrdf.validity import Judgement, gaussian_roughness, judge
 
 __all__ = ["MicrofacetModel"]
 
@@ -61,6 +63,10 @@ class MicrofacetModel:
         Strength of the second term of (23), which grows at grazing. [1]
     volume_form, grazing_form : str
         Keys of `pbrdf.analytic.VOLUME_FORMS` and `GRAZING_FORMS`.
+    height_rms : float, optional
+        Rms height. It changes nothing: with it the model can be judged, see `judge`, and
+        `brdf` warns at a wavelength where geometric optics fails. Slopes alone tell neither
+        the coherent beam nor the curvature. [um]
 
     Raises
     ------
@@ -97,6 +103,7 @@ class MicrofacetModel:
     grazing_albedo: float = 0.0
     volume_form: str = "polarised-base"
     grazing_form: str = "bounded"
+    height_rms: float | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.material, str):
@@ -126,6 +133,11 @@ class MicrofacetModel:
                 "be >= 0 [1]",
                 "It is a gain.",
             )
+        if self.height_rms is not None:
+            one_number(
+                "height_rms", self.height_rms, lambda v: (v > 0) & np.isfinite(v),
+                "be > 0 [um]", "Leave it out where heights are not known.",
+            )  # fmt: skip
         for name in ("shadow_omega", "shadow_tau"):
             one_number(
                 name, getattr(self, name), lambda v: v > 0, "be > 0 [rad]",
@@ -204,8 +216,17 @@ class MicrofacetModel:
         ValueError
             If an angle leaves its range (degrees?), or the wavelength the material's, or if
             `out` does not fit.
+
+        Warns
+        -----
+        AccuracyWarning
+            If height_rms is known and geometric optics fails at the wavelength. Without
+            height_rms that cannot be judged, and nothing is said.
         """
         n, kappa = self.material.indices(wavelength)
+        if self.height_rms is not None and wavelength is not None:
+            for note in self.judge(np.unique(theta_i), np.unique(wavelength)).notes:
+                warnings.warn(note, AccuracyWarning, stacklevel=2)
         shape, columns = flat_geometry(theta_i, theta_s, dphi, phi_i, n, kappa)
         matrices = _writable(out, (*shape, 4, 4))
         if isinstance(self.slope_distribution, SlopeTable):
@@ -217,6 +238,47 @@ class MicrofacetModel:
             columns[4:] = [np.broadcast_to(c, size).copy() for c in columns[4:]]
         _fill(columns, self.surface(), matrices.reshape(-1))
         return matrices
+
+    def judge(self, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike) -> Judgement:
+        """Judge where geometric optics holds: numbers, and what they mean in sentences.
+
+        Parameters
+        ----------
+        theta_i : array_like
+            Zeniths of the source. [rad]
+        wavelength : array_like
+            Vacuum wavelengths. [um]
+
+        Returns
+        -------
+        Judgement
+            `numbers` by the names of `pbrdf.conventions.RESULT_VARIABLES` and `notes`. The
+            surface is taken as Gaussian, of height_rms and slope_rms. Without height_rms
+            there are no numbers, and the one note says what cannot be judged.
+
+        Examples
+        --------
+        >>> model = MicrofacetModel(Material(1.5), slope_rms=0.2, height_rms=0.05)
+        >>> model.judge(0.3, 0.55).numbers["coherent_share"].round(2)
+        array([[0.3]])
+        >>> print(*MicrofacetModel(Material(1.5), slope_rms=0.2).judge(0.3, 0.55).notes)
+        The coherent beam and the tangent plane cannot be judged from slopes alone. Give \
+height_rms.
+        """
+        if self.height_rms is None:
+            note = (
+                "The coherent beam and the tangent plane cannot be judged from slopes "
+                "alone. Give height_rms."
+            )
+            return Judgement(notes=(note,))
+        zenith = np.atleast_1d(checked_zenith("theta_i", theta_i)).ravel()
+        waves = require(
+            "wavelength", wavelength, lambda v: (v > 0) & np.isfinite(v),
+            "be positive [um]", "Wavelengths are micrometres.",
+        )  # fmt: skip
+        slope = float(np.sqrt(np.mean(np.square(self.slope_rms))))
+        rough = gaussian_roughness(float(self.height_rms), slope)
+        return judge(rough, zenith, np.atleast_1d(waves).ravel())
 
     def _fill_tabulated(
         self, table: SlopeTable, columns: list[np.ndarray], out: np.ndarray

@@ -15,7 +15,7 @@ import xarray as xr
 from pbrdf._version import __version__
 from pbrdf.analytic.geometry import flat_geometry
 from pbrdf.errors import AccuracyWarning
-from pbrdf.kernels.paths.shading import N_LEAKED
+from pbrdf.kernels.paths.shading import LEAKED, N_LEAKED, SIDEWAYS, TRUNCATED
 from pbrdf.observation.look import Look, Sight
 from pbrdf.observation.one_sample import look_at
 from pbrdf.observation.readings import Readings, as_scan, to_dataset
@@ -25,7 +25,7 @@ from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
 from pbrdf.tracer import arguments
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.schedule import gather
-from pbrdf.tracer.validity import lost_ray_warnings
+from pbrdf.validity import attach, lost_light_warnings, lost_ray_warnings
 
 __all__ = ["ESTIMATORS", "as_scan", "observe"]
 
@@ -44,6 +44,8 @@ NARROW_CONE = 0.15
 # More rays into the hemisphere than this need a decay with the bounces
 SAFE_SAMPLES = 2.0
 SAFE_DECAY = 0.8
+# Bounces that light is given by default
+MOST_BOUNCES = 64
 # Narrower cones lose digits [rad]
 NARROW = 1e-4
 
@@ -60,7 +62,7 @@ def observe(  # noqa: PLR0913  (the public signature)
     n_rays: int = 100_000,
     realizations: int = 1,
     seed: int | None = 0,
-    max_bounces: int = 64,
+    max_bounces: int = MOST_BOUNCES,
     hemisphere_samples: float = 2.0,
     sample_decay: float = 0.5,
     estimator: str = "facets",
@@ -204,7 +206,8 @@ def observe(  # noqa: PLR0913  (the public signature)
     _check_growth(look.hemisphere_samples, look.sample_decay)
     target = None if target_rel_error is None else arguments.target_error(target_rel_error)
     arguments.check_scene(scene)
-    notes = arguments.scene_warnings(scene, np.unique(angles[0]), waves, drawn)
+    judged = arguments.judge_surface(scene, angles[0], waves)
+    notes = [*arguments.scene_warnings(scene, drawn), *judged.notes]
     if estimator in ("facets", "corners") and widest > WIDE * slope > 0.0:
         lost = "matrices err by" if estimator == "facets" else "multiple bounces lose"
         notes.append(
@@ -228,10 +231,16 @@ def observe(  # noqa: PLR0913  (the public signature)
         draw, root, lambda sight, _: seen.add(sight), seen.rel_error, samples=samples,
         target=target, workers=arguments.worker_count(workers), progress=progress,
     )  # fmt: skip
-    for note in (late := lost_ray_warnings(int(seen.counts[N_LEAKED]), seen.bundles)):
+    late = lost_ray_warnings(int(seen.counts[N_LEAKED]), seen.bundles)
+    late += _missing_light(
+        seen, ("left_sideways",) if late else ("leaked", "left_sideways")
+    )
+    cut = _missing_light(seen, ("truncated",))
+    # Told in any case, but no surprise to one who set a low limit
+    for note in [*late, *(cut if look.max_bounces >= MOST_BOUNCES else ())]:
         warnings.warn(note, AccuracyWarning, stacklevel=2)
-    notes += late
-    return to_dataset(
+    notes += [*late, *cut]
+    result = to_dataset(
         seen,
         wavelength=waves,
         attrs={
@@ -257,6 +266,14 @@ def observe(  # noqa: PLR0913  (the public signature)
             "scene": scene_text(scene),
         },
     )
+    return attach(result, judged.numbers, axis="geometry")
+
+
+def _missing_light(seen: Readings, fates: tuple[str, ...]) -> list[str]:
+    """Say what share of the light met some fate, where it is more than a thousandth."""
+    columns = {"leaked": LEAKED, "left_sideways": SIDEWAYS, "truncated": TRUNCATED}
+    shares = {fate: seen.energy[:, columns[fate]] for fate in fates}
+    return lost_light_warnings(shares, None, seen.look.max_bounces)
 
 
 def _look_at_realization(

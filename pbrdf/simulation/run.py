@@ -13,7 +13,7 @@ import xarray as xr
 from pbrdf.contaminants import Film
 from pbrdf.contaminants.arguments import material_of
 from pbrdf.errors import AccuracyWarning
-from pbrdf.kernels.paths.shading import N_LEAKED
+from pbrdf.kernels.paths.shading import LEAKED, N_LEAKED, N_SIDE, SIDEWAYS, TRUNCATED
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.plan import Plan, Tally
@@ -26,8 +26,14 @@ from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.schedule import gather
 from pbrdf.tracer.thin_films import thin_absorber_warnings
-from pbrdf.tracer.validity import contamination_warnings, lost_ray_warnings
 from pbrdf.tracer.wet_field import WetField, contaminant_materials, media_of
+from pbrdf.validity import (
+    Judgement,
+    attach,
+    judge_contaminants,
+    lost_light_warnings,
+    lost_ray_warnings,
+)
 
 # Where paths are cut: on a clean surface, and where transparent bodies may catch light
 MOST_BOUNCES, MOST_EVENTS = 64, 1024
@@ -181,7 +187,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
     plans = [plan.at(azimuth) for azimuth in azimuths]
     target = None if target_rel_error is None else arguments.target_error(target_rel_error)
     arguments.check_scene(scene)
-    notes = arguments.scene_warnings(scene, angles, waves, drawn)
+    judged = arguments.judge_surface(scene, angles, waves)
+    notes = [*arguments.scene_warnings(scene, drawn), *judged.notes]
     for note in notes:
         warnings.warn(note, AccuracyWarning, stacklevel=2)
 
@@ -206,11 +213,15 @@ def simulate(  # noqa: PLR0913  (the public signature)
         samples=samples, target=target, workers=arguments.worker_count(workers),
         progress=progress,
     )  # fmt: skip
-    late = _late_notes(moments, waves) + _thin_films(scene, moments[0], waves)
+    laid = _judge_contaminants(scene, moments[0], waves)
+    late = [*moments[0].notes, *laid.notes, *_missing_light(moments)]
+    late += _thin_films(scene, moments[0], waves)
     for note in late:
         warnings.warn(note, AccuracyWarning, stacklevel=2)
     notes += late
-    return to_dataset(
+    # Told in any case, but no surprise to one who set the limit
+    notes += _cut_light(moments, asked=max_bounces is not None)
+    result = to_dataset(
         moments,
         scene,
         several=several,
@@ -233,17 +244,46 @@ def simulate(  # noqa: PLR0913  (the public signature)
             "warnings": notes,
         },
     )
+    return attach(result, {**judged.numbers, **laid.numbers})
 
 
-def _late_notes(moments: Sequence[Moments], waves: np.ndarray | None) -> list[str]:
-    """Warnings of what lies on the surface and of lost rays, known only after tracing."""
+def _judge_contaminants(
+    scene: Scene, moments: Moments, waves: np.ndarray | None
+) -> Judgement:
+    """Judge what lies on the surface, known only after laying it."""
+    if waves is None or not scene.contaminants:
+        return Judgement()
+    indices = [material_of(one.material).indices(waves) for one in scene.contaminants]
+    return judge_contaminants(moments.reports, waves, indices)
+
+
+def _missing_light(moments: Sequence[Moments]) -> list[str]:
+    """Warnings of rays lost, and of light that leaked or left sideways."""
     first = moments[0]
-    late = list(first.notes)
-    for wave in () if waves is None else np.atleast_1d(waves):
-        late += contamination_warnings(first.reports, float(wave))
     lost = sum(int(one.counts[:, N_LEAKED].sum()) for one in moments)
     rays = first.plan.n_rays * first.samples * len(first.plan.theta_i) * len(moments)
-    return late + lost_ray_warnings(lost, rays)
+    energy = np.max([one.energy() for one in moments], axis=0)
+    aside = np.max([one.counts[:, N_SIDE] for one in moments], axis=0)
+    shares = {
+        "leaked": energy[..., LEAKED],
+        "left_sideways": energy[..., SIDEWAYS],
+        "side_exits": aside / (first.plan.n_rays * first.samples),
+    }
+    plan = first.plan
+    found = lost_ray_warnings(lost, rays)
+    if found:
+        del shares["leaked"]  # said already
+    return found + lost_light_warnings(shares, plan.theta_i, plan.max_bounces)
+
+
+def _cut_light(moments: Sequence[Moments], *, asked: bool) -> list[str]:
+    """Say how much light was cut off; a warning unless the limit was asked for."""
+    plan = moments[0].plan
+    share = np.max([one.energy() for one in moments], axis=0)[..., TRUNCATED]
+    found = lost_light_warnings({"truncated": share}, plan.theta_i, plan.max_bounces)
+    for note in () if asked else found:
+        warnings.warn(note, AccuracyWarning, stacklevel=3)
+    return found
 
 
 def _thin_films(scene: Scene, moments: Moments, waves: np.ndarray | None) -> list[str]:

@@ -126,6 +126,15 @@ class MeasuredSurface:
         """Ensemble rms height. [um]"""
         return self.height_rms
 
+    def decorrelation(self, axis: int, lag: np.ndarray) -> np.ndarray:
+        """1 minus the autocorrelation at distances along an axis [um]. [1]"""
+        return 1.0 - self._rho(np.asarray(lag) / self._lengths[axis])
+
+    def likely_heights(self, count: int) -> np.ndarray:
+        """Heights of which each is as likely as the next, rising. [um]"""
+        scores = special.ndtri((np.arange(count) + 0.5) / count)
+        return self.height_rms * self._transform(scores)
+
     @property
     def clipped(self) -> float:
         """Share of the height variance that no Gaussian field can have in this form."""

@@ -10,7 +10,7 @@ from pbrdf.errors import check_seed, one_number, require
 from pbrdf.kernels.paths.shading import base_strength
 from pbrdf.scene.scene import Contamination, Scene
 from pbrdf.surface import HeightMap, Surface
-from pbrdf.tracer.validity import geometric_optics_warnings
+from pbrdf.validity import Judgement, judge, resolution_warnings, roughness_of
 
 STOKES_COUNT = {"full": 4, "linear": 3, "unpolarized": 1}
 # A fixed surface has no realisations; its rays are dealt to this many independent batches
@@ -191,9 +191,7 @@ def check_scene(scene: Scene) -> None:
         raise ValueError(msg)
 
 
-def scene_warnings(
-    scene: Scene, angles: np.ndarray, waves: np.ndarray | None, drawn: int
-) -> list[str]:
+def scene_warnings(scene: Scene, drawn: int) -> list[str]:
     """Say what limits the trust in a run."""
     notes: list[str] = []
     if varies(scene) and drawn == 1:
@@ -206,10 +204,16 @@ def scene_warnings(
             f"{drawn} realizations are too few for honest standard errors; "
             "ask for 16 or more."
         )
-    if waves is not None and not isinstance(scene.surface, HeightMap):
-        for wave in np.atleast_1d(waves):
-            notes += geometric_optics_warnings(scene.surface, angles, float(wave))
+    if not isinstance(scene.surface, HeightMap):
+        notes += resolution_warnings(roughness_of(scene.surface))
     return notes
+
+
+def judge_surface(scene: Scene, angles: np.ndarray, waves: np.ndarray | None) -> Judgement:
+    """Judge the surface of a scene, where a wavelength is known."""
+    if waves is None:
+        return Judgement()
+    return judge(roughness_of(scene.surface), angles, waves)
 
 
 def varies(scene: Scene) -> bool:

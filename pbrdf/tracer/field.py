@@ -16,11 +16,9 @@ GUARD_HEIGHTS = 2.0
 GUARD_SHARE = 0.125
 # Least share of the area of a finite map that must be left for entry points
 LEAST_INTERIOR = 0.1
-# Periods that light may cross on its way down the height range of a periodic surface: the
-# first meetings of a line of rays take a walk over all of them. Few cells cost nothing: a
-# thick film on a small flat map is crossed without end
-MOST_PERIODS = 1000.0
-MOST_CELLS = 1e5
+# Cells that light may cross on its way down the height range of a periodic surface: the
+# first meetings of a line of rays take a walk over all of them, some 10 ns each
+MOST_CROSSED = 4e6
 # As many times more lines of entry points carry the directions of a source of some width
 LINES_OF_A_DISC = 4
 NO_LABELS = np.empty((0, 0), dtype=np.uint8)
@@ -120,8 +118,7 @@ class Field:
         ------
         ValueError
             If less than a tenth of a finite map is left, or the light grazes a periodic
-            surface so that it crosses more than a thousand periods, and as many cells as
-            take long, on its way down.
+            surface so that it crosses millions of cells on its way down.
         """
         nx, ny = self.terrain.heights.shape
         if self.periodic:
@@ -133,19 +130,18 @@ class Field:
         return self._entries[known]
 
     def _refuse_grazing(self, theta: float) -> None:
-        """Refuse light that crosses too many periods before it has come down."""
-        nx, ny = self.terrain.heights.shape
-        period = min(nx * self.pitch[0], ny * self.pitch[1])
+        """Refuse light that crosses too many cells before it has come down."""
+        pitch = min(self.pitch)
         reach = np.tan(theta) * self.height_range
-        longest = max(MOST_PERIODS * period, MOST_CELLS * min(self.pitch))
-        if reach > longest:
-            highest = np.arctan(longest / self.height_range)
+        if reach > MOST_CROSSED * pitch:
+            highest = np.arctan(MOST_CROSSED * pitch / self.height_range)
             msg = (
                 f"theta_i must be at most {highest:.7f} rad over this surface "
                 f"({np.rad2deg(highest):.5f} deg), got {theta:.7f}: light would cross "
-                f"{reach / period:.3g} periods of {period:.4g} um on its way down "
-                f"{self.height_range:.3g} um of height. Take a steeper source; at grazing "
-                "every surface is a mirror, which geometric optics does not know."
+                f"{reach / pitch:.3g} cells of {pitch:.4g} um on its way down "
+                f"{self.height_range:.4g} um of height. Take a steeper source, or look for "
+                "heights that are no surface. At grazing every surface is a mirror, which "
+                "geometric optics does not know."
             )
             raise ValueError(msg)
 

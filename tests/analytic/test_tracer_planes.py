@@ -93,6 +93,7 @@ def plate(slope_x, slope_y):
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("skips", [True, False])
+@pytest.mark.filterwarnings("ignore:.*left the finite map sideways")
 def test_plate_tilted_by_10_deg(axis_deg, theta_deg, phi_i, skips):
     tilt, axis = np.deg2rad(10.0), np.deg2rad(axis_deg)
     # Turning z by +10 deg about (cos a, sin a, 0), right-handed

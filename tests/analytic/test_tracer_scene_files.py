@@ -68,6 +68,7 @@ def test_limiting_materials_round_trip(material, tmp_path):
     assert again.substrate.index() == material.index()
 
 
+@pytest.mark.filterwarnings("ignore:A period of")
 def test_result_carries_a_scene_that_can_be_read_again(tmp_path):
     result = simulate(Scene(GAUSSIAN, Material(1.5)), 0.3, n_rays=320, realizations=8)
     path = tmp_path / "from_result.toml"

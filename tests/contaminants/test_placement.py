@@ -10,7 +10,7 @@ from pbrdf import Drops, Film, GaussianSurface, HeightMap, Material, Scene, Sphe
 from pbrdf.contaminants import place
 from pbrdf.contaminants.ground import Ground
 from pbrdf.contaminants.shapes import cap
-from pbrdf.tracer.validity import contamination_warnings
+from pbrdf.validity import contamination_warnings
 
 SEED = np.random.SeedSequence(5)
 ROUGH = GaussianSurface(

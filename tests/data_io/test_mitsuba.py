@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from data_io import export_mitsuba, read_goniometer
 from data_io.reflectance import pbsdf
-from data_io.reflectance.mitsuba import HalfVectorGrid, _tabulate
+from data_io.reflectance.half_vector import HalfVectorGrid, tabulate
 from pbrdf import AccuracyWarning, Material, MicrofacetModel
 from pbrdf.optics.exchange import convert_brdf
 
@@ -131,7 +131,7 @@ def test_frames_and_angles_of_a_field_without_symmetry():
         theta_d=np.linspace(0, np.pi / 2, 9),
         theta_h=np.linspace(0, np.pi / 2, 11),
     )
-    table = _tabulate(lambda *geometry: lopsided(*geometry)[None], grid)[0]
+    table = tabulate(lambda *geometry: lopsided(*geometry)[None], grid)[0]
     fields = {name: axis[None] for name, axis in grid._asdict().items()}
     for node, geometry in nodes_above_horizon(fields, 60):
         expected, _ = convert_brdf(

@@ -144,7 +144,7 @@ def test_masked_arguments_are_refused_by_name(name, call):
     ],
 )  # fmt: skip
 def test_complex_values_are_refused_by_name(name, call):
-    with pytest.raises(TypeError, match=f"{name} must be real numbers, got complex"):
+    with pytest.raises(TypeError, match=f"{name} must be real, got complex"):
         call(0.5 + 0.1j)
 
 
@@ -169,12 +169,12 @@ def test_seeds_are_checked_by_name(seed, call):
     "name", ["realizations", "n_rays", "max_bounces", "n_theta", "n_dphi", "workers"]
 )
 def test_counts_are_no_truth_values(name):
-    with pytest.raises(TypeError, match=f"{name} must be real numbers, got truth values"):
+    with pytest.raises(TypeError, match=f"{name} must be numbers, got truth values"):
         simulate(SCENE, 0.3, **{"n_rays": 320, name: True})
 
 
 def test_a_source_too_near_the_horizon_is_refused():
     scene = Scene(SURFACE.sample(3), Material.mirror())
-    with pytest.raises(ValueError, match=r"theta_i must be at most .* periods"):
-        simulate(scene, np.deg2rad(89.9999), n_rays=320)
+    with pytest.raises(ValueError, match=r"theta_i must be at most .* cells"):
+        simulate(scene, np.deg2rad(89.99995), n_rays=320)
     assert simulate(scene, np.deg2rad(89.99), n_rays=320).albedo.sum() == pytest.approx(1)

@@ -43,6 +43,8 @@ def test_each_azimuth_is_what_it_is_alone(scene, options):
     assert max(together.attrs["rays_escaped"]) > 2 * max(alone.attrs["rays_escaped"])
 
 
+@pytest.mark.filterwarnings("ignore:.*left the finite map sideways")
+@pytest.mark.filterwarnings("ignore:A period of")
 def test_grooves_are_seen_and_files_keep_them(tmp_path):
     result = simulate(
         Scene(GROOVES, GLASS), 0.3, phi_i=AZIMUTHS[[0, 2]], n_rays=3000, realizations=16
@@ -59,6 +61,7 @@ def test_grooves_are_seen_and_files_keep_them(tmp_path):
     assert back.attrs["phi_i"] == result.attrs["phi_i"] == list(AZIMUTHS[[0, 2]])
 
 
+@pytest.mark.filterwarnings("ignore:A period of")
 def test_one_target_holds_for_all_azimuths():
     options = {"n_rays": 2000, "realizations": 8, "n_theta": 9, "n_dphi": 4}
     scene = Scene(GROOVES, GLASS)

@@ -31,6 +31,7 @@ def rays_in_bins(result):
     ("slope", "periodic"),
     [(slope, periodic) for slope in (0.05, 0.3, 0.47) for periodic in (True, False)],
 )
+@pytest.mark.filterwarnings("ignore:.*left the finite map sideways")
 def test_walk_and_embree_send_the_same_rays_the_same_way(slope, periodic):
     drawn = GaussianSurface(
         shape=(200, 160), spacing=1.0, corr_length=16.0, slope_rms=slope
@@ -98,6 +99,7 @@ def test_fewer_stokes_elements_are_the_corner_of_all(stokes, elements, skips):
         assert_allclose(part[name], corner[name], rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.filterwarnings("ignore:The tangent plane errs")
 def test_wavelengths_together_equal_wavelengths_apart():
     waves = np.array([0.4, 0.55, 0.7])
     material = Material.from_table(

@@ -1,5 +1,6 @@
 """`pbrdf export`: results and models in the formats of other programs."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -45,6 +46,7 @@ def command(
     if source.suffix not in (".nc", ".toml"):
         msg = f"source must be a result (.nc) or a model (.toml), got {source.name!r}."
         raise ValueError(msg)
+    accuracy = None
     with staged_file(output, force=force) as stage:
         if source.suffix == ".toml":
             model = data_io.read_model(source)
@@ -52,12 +54,34 @@ def command(
                 incidences = options.incidences(theta_i)
                 data_io.write_goniometer(model_rows(model, incidences, wavelength), stage)
             else:
-                data_io.export_mitsuba(model, stage, wavelength=wavelength)
+                accuracy = data_io.export_mitsuba(model, stage, wavelength=wavelength)
         elif output.suffix == ".csv":
             data_io.write_goniometer(as_rows(data_io.read_result(source)), stage)
         else:
-            data_io.export_mitsuba(data_io.read_result(source), stage)
+            accuracy = data_io.export_mitsuba(data_io.read_result(source), stage)
+        if accuracy is not None:
+            beside = stage.with_name(f"{stage.name}.json")
+            beside.replace(output.with_name(f"{output.name}.json"))
     typer.echo(f"Written: {output}")
+    for line in () if accuracy is None else _accuracy_lines(accuracy):
+        typer.echo(line)
+
+
+def _accuracy_lines(accuracy: "xr.Dataset") -> Iterator[str]:
+    """Yield how far the file is from its source, a line a class of brightness."""
+    yield "Between its nodes it differs from the source, in parts of M00:"
+    for name in accuracy.brightness.values:
+        here = accuracy.sel(brightness=name)
+        if int(here["count"]) == 0:
+            continue
+        first = here.error.isel(stokes_out=0, stokes_in=0)
+        others = here.error.max(["stokes_out", "stokes_in"])
+        shares = ", ".join(
+            f"{label} {100 * float(first.sel(quantile=label)):.2g} % (worst element "
+            f"{100 * float(others.sel(quantile=label)):.2g} %)"
+            for label in here["quantile"].values
+        )
+        yield f"  M00 {name} of its peak: {shares}"
 
 
 def model_rows(

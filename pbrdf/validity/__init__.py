@@ -1,0 +1,23 @@
+"""Where a result is not to be trusted: one judgement for every surface and every entry.
+
+Warnings and numbers, never corrections.
+"""
+
+from pbrdf.validity.contaminants import contamination_warnings, judge_contaminants
+from pbrdf.validity.light import lost_light_warnings, lost_ray_warnings
+from pbrdf.validity.limits import Judgement, attach, judge, resolution_warnings
+from pbrdf.validity.roughness import Roughness, gaussian_roughness, roughness_of
+
+__all__ = [
+    "Judgement",
+    "Roughness",
+    "attach",
+    "contamination_warnings",
+    "gaussian_roughness",
+    "judge",
+    "judge_contaminants",
+    "lost_light_warnings",
+    "lost_ray_warnings",
+    "resolution_warnings",
+    "roughness_of",
+]

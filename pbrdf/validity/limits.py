@@ -1,0 +1,180 @@
+"""The limits of geometric optics, as numbers and in words."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pbrdf.conventions import RESULT_VARIABLES
+from pbrdf.validity.roughness import Roughness
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Share of the light in a coherent beam that geometric optics may miss
+MOST_COHERENT = 0.01
+# k R cos³θ from which the tangent plane holds: its error is of the order of the inverse.
+# At normal incidence a radius of five wavelengths
+LEAST_CURVATURE = 10.0 * np.pi
+# A surface that deviates less than this from its plane mirrors as the plane does [1]
+FLAT = 1e-4
+# Below this correlation of slopes from cell to cell, structure goes on below the cells
+LEAST_SMOOTH = 0.5
+# How far coarse grids change light of one bounce and of three and more, by the cells a
+# correlation length [1]: what studies/surface_resolution found, or more
+CELLS = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
+OF_ONE = (0.004, 0.002, 0.002, 0.002, 0.0015, 0.001, 0.0005)
+OF_THREE = (0.45, 0.28, 0.14, 0.14, 0.13, 0.05, 0.02)
+LEAST_CELLS = 6.0
+# Short periods change light of one bounce by this over the square of the correlation
+# lengths a period, in the same study; from here on by less than 0.2 %
+OF_PERIOD = 0.08
+LEAST_LENGTHS = 6.4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judgement:
+    """Numbers by the names of `RESULT_VARIABLES`, and what they mean in sentences."""
+
+    numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def judge(
+    rough: Roughness, theta_i: np.ndarray, wavelength: np.ndarray | float
+) -> Judgement:
+    """Judge a surface under light of zenith angles [rad] and wavelengths [um].
+
+    - `coherent_share`: light that stays in a specular beam, |<exp(2 i k h cosθ)>|²
+      (Davies 1954), which geometric optics spreads over the lobe.
+    - `curvature_number`: k R cos³θ with the typical radius of curvature R over half a
+      wavelength; the tangent plane errs by the order of its inverse (Brekhovskikh 1952).
+    - `corr_length_in_waves`, `cell_in_waves`: lengths over the wavelength; roughness
+      shorter than the wavelength diffracts.
+
+    Examples
+    --------
+    >>> from pbrdf.validity.roughness import gaussian_roughness
+    >>> found = judge(gaussian_roughness(2.8, 0.2), np.array([0.3, 1.2]), np.array([0.55]))
+    >>> found.numbers["curvature_number"].round(0)
+    array([[427.],
+           [ 23.]])
+    >>> print(*found.notes)
+    The tangent plane errs by about 4.3 % at theta_i 68.75 deg and 0.55 um: k R cos³ \
+theta_i is 23 with a typical radius of curvature R of 42.9 um, and should be above 31.
+    """
+    theta = np.atleast_1d(np.asarray(theta_i, dtype=np.float64))
+    waves = np.atleast_1d(np.asarray(wavelength, dtype=np.float64))
+    cosine = np.cos(theta)[:, None]
+    radius = rough.curvature_radius(waves / 2)
+    with np.errstate(over="ignore", invalid="ignore"):
+        curvature = 2 * np.pi * radius / waves * cosine**3
+    share = rough.coherent_share(4 * np.pi * cosine / waves)
+    shortest = rough.corr_length / waves
+    cell = rough.cell / waves
+    numbers = {
+        "coherent_share": share,
+        "curvature_number": curvature,
+        "corr_length_in_waves": shortest,
+        "cell_in_waves": cell,
+    }
+    if rough.slope_rms <= FLAT:
+        return Judgement(numbers=numbers)
+
+    notes = []
+    if share.max() > MOST_COHERENT:
+        a, w = np.unravel_index(np.argmax(share), share.shape)
+        notes.append(
+            f"{100 * share[a, w]:.2g} % of the light stays in a coherent specular beam at "
+            f"{_place(theta[a], waves[w])} (rms height {rough.height_rms:.3g} um), which "
+            "geometric optics spreads over the lobe"
+            f"{_others(share > MOST_COHERENT)}."
+        )
+    if curvature.min() < LEAST_CURVATURE:
+        a, w = np.unravel_index(np.argmin(curvature), curvature.shape)
+        size = 100 / curvature[a, w]
+        by = f"by about {size:.2g} %" if size < 100 else "by as much as the light itself"
+        notes.append(
+            f"The tangent plane errs {by} at {_place(theta[a], waves[w])}: k R cos³ "
+            f"theta_i is {curvature[a, w]:.2g} with a typical radius of curvature R of "
+            f"{radius[w]:.3g} um, and should be above {LEAST_CURVATURE:.2g}"
+            f"{_others(curvature < LEAST_CURVATURE)}."
+        )
+    if shortest.min() < 1.0:
+        notes.append(
+            f"The correlation length, {rough.corr_length:.3g} um, is below the wavelength, "
+            f"{waves[np.argmin(shortest)]:g} um: such roughness diffracts"
+            f"{_others(shortest < 1.0)}."
+        )
+    if not rough.generated and rough.smooth < LEAST_SMOOTH and cell.max() > 0.5:
+        notes.append(
+            f"Cells of {rough.cell:.3g} um are wider than half the wavelength, "
+            f"{waves[np.argmax(cell)]:g} um, and slopes change from cell to cell "
+            f"(correlation {rough.smooth:.2g}): roughness between them, which the map does "
+            "not hold, scatters too. Measure with smaller pixels."
+        )
+    return Judgement(numbers=numbers, notes=tuple(notes))
+
+
+def resolution_warnings(rough: Roughness) -> list[str]:
+    """Say how far the grid and the period of a random surface change its reflectance.
+
+    Sizes are those of slopes of 0.3 at 60 degrees (studies/surface_resolution).
+
+    Examples
+    --------
+    >>> from pbrdf.surface import GaussianSurface
+    >>> from pbrdf.validity.roughness import roughness_of
+    >>> coarse = GaussianSurface(shape=(64, 64), spacing=1.0, corr_length=1, slope_rms=0.3)
+    >>> print(*resolution_warnings(roughness_of(coarse)))
+    1 cells a correlation length are too few: light of one bounce changes by up to 0.2 %, \
+of three and more by up to 28 %. Take at least 6, a spacing of corr_length / 6 or less.
+    """
+    notes = []
+    if rough.cells < LEAST_CELLS:
+        one, three = (100 * np.interp(rough.cells, CELLS, by) for by in (OF_ONE, OF_THREE))
+        notes.append(
+            f"{rough.cells:.3g} cells a correlation length are too few: light of one "
+            f"bounce changes by up to {one:.2g} %, of three and more by up to {three:.2g} "
+            f"%. Take at least {LEAST_CELLS:g}, a spacing of corr_length / "
+            f"{LEAST_CELLS:g} or less."
+        )
+    if rough.lengths < LEAST_LENGTHS:
+        size = 100 * OF_PERIOD / rough.lengths**2
+        notes.append(
+            f"A period of {rough.lengths:.3g} correlation lengths is too short: light of "
+            f"one bounce changes by up to {size:.2g} %. Take shape times spacing of "
+            f"{LEAST_LENGTHS:g} corr_length or more, better 16."
+        )
+    return notes
+
+
+def attach(
+    dataset: "xr.Dataset", numbers: Mapping[str, np.ndarray], *, axis: str = "theta_i"
+) -> "xr.Dataset":
+    """Add the numbers of a judgement to a result, with units from the one table.
+
+    `axis` is the dimension of the result along which theta_i runs.
+    """
+    added = {}
+    for name, values in numbers.items():
+        entry = RESULT_VARIABLES[name]
+        dims = tuple(axis if dim == "theta_i" else dim for dim in entry.dims)
+        if "wavelength" in dims and "wavelength" not in dataset.dims:
+            values = np.squeeze(values, dims.index("wavelength"))
+            dims = tuple(dim for dim in dims if dim != "wavelength")
+        about = {"units": entry.units, "long_name": entry.long_name}
+        added[name] = (dims, values, about)
+    return dataset.assign(added)
+
+
+def _place(theta: float, wave: float) -> str:
+    """Say where the worst is."""
+    return f"theta_i {np.rad2deg(theta):.4g} deg and {wave:g} um"
+
+
+def _others(broken: np.ndarray) -> str:
+    """Say how many others break a limit too."""
+    count = int(broken.sum())
+    return "" if count < 2 else f"; the worst of {count} of {broken.size} such cases"
