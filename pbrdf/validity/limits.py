@@ -26,11 +26,12 @@ LEAST_SMOOTH = 0.5
 CELLS = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
 OF_ONE = (0.004, 0.002, 0.002, 0.002, 0.0015, 0.001, 0.0005)
 OF_THREE = (0.45, 0.28, 0.14, 0.14, 0.13, 0.05, 0.02)
-LEAST_CELLS = 6.0
-# Short periods change light of one bounce by this over the square of the correlation
-# lengths a period, in the same study; from here on by less than 0.2 %
-OF_PERIOD = 0.08
-LEAST_LENGTHS = 6.4
+LEAST_CELLS = 5.0
+# Short periods change light of one bounce by at most this, times the square of the slope
+# over that of the study and over the square of the correlation lengths a period
+OF_PERIOD, SLOPE = 0.08, 0.3
+# Change of M00 in the lobe that needs no word
+LEAST_CHANGE = 0.002
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +130,7 @@ def resolution_warnings(rough: Roughness) -> list[str]:
     >>> coarse = GaussianSurface(shape=(64, 64), spacing=1.0, corr_length=1, slope_rms=0.3)
     >>> print(*resolution_warnings(roughness_of(coarse)))
     1 cells a correlation length are too few: light of one bounce changes by up to 0.2 %, \
-of three and more by up to 28 %. Take at least 6, a spacing of corr_length / 6 or less.
+of three and more by up to 28 %. Take at least 5, a spacing of corr_length / 5 or less.
     """
     notes = []
     if rough.cells < LEAST_CELLS:
@@ -140,12 +141,13 @@ of three and more by up to 28 %. Take at least 6, a spacing of corr_length / 6 o
             f"%. Take at least {LEAST_CELLS:g}, a spacing of corr_length / "
             f"{LEAST_CELLS:g} or less."
         )
-    if rough.lengths < LEAST_LENGTHS:
-        size = 100 * OF_PERIOD / rough.lengths**2
+    size = OF_PERIOD * (rough.slope_rms / SLOPE / rough.lengths) ** 2
+    if size > LEAST_CHANGE:
+        least = rough.lengths * np.sqrt(size / LEAST_CHANGE)
         notes.append(
             f"A period of {rough.lengths:.3g} correlation lengths is too short: light of "
-            f"one bounce changes by up to {size:.2g} %. Take shape times spacing of "
-            f"{LEAST_LENGTHS:g} corr_length or more, better 16."
+            f"one bounce changes by up to {100 * size:.2g} %. Take shape times spacing of "
+            f"{least:.2g} corr_length or more, better 16."
         )
     return notes
 

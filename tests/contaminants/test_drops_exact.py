@@ -52,6 +52,7 @@ def polarised_light(result, bounces=None):
     return flux.values, stderr.values
 
 
+@pytest.mark.filterwarnings("ignore:.*left the finite map sideways")
 def test_c08_water_sphere_bin_by_bin():
     """Scattered backwards by 90 to 180 degrees; no light reaches the black plane's side."""
     result, coverage = one_sphere(WATER, n_theta=18, n_dphi=2)
@@ -85,6 +86,7 @@ def rainbow(n, order, edges, impacts=2_000_001):
     return light[0] + light[1], light[0] - light[1]
 
 
+@pytest.mark.filterwarnings("ignore:.*left the finite map sideways")
 def test_c07_rainbow_stands_at_its_angle_with_its_polarisation():
     # Zenith bins of half a degree: the bow is at 180 - 137.9219 = 42.0781 degrees
     result, coverage = one_sphere(WATER, n_theta=180, n_dphi=2, n_rays=2_000_000)
@@ -101,6 +103,7 @@ def test_c07_rainbow_stands_at_its_angle_with_its_polarisation():
 
 
 @pytest.mark.parametrize("theta_deg", [0.0, 30.0])
+@pytest.mark.filterwarnings("ignore:.*left the finite map sideways")
 def test_c09_mirror_sphere_on_black_ground(theta_deg):
     theta = np.deg2rad(theta_deg)
     # The light is so inclined that none of it misses the plane beyond the sphere
@@ -123,6 +126,7 @@ def test_c09_mirror_sphere_on_black_ground(theta_deg):
     clean_counters(result)
 
 
+@pytest.mark.filterwarnings("ignore:.*left the finite map sideways")
 def test_c09_all_elements_of_the_outside_of_a_sphere():
     """Single reflections out of the plane of incidence, averaged over the bin."""
     theta, radius = np.deg2rad(30.0), 0.2

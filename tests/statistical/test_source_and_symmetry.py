@@ -86,6 +86,7 @@ def test_a_tiny_disc_is_a_beam():
     assert (np.abs(beam.brdf_total - disc_.brdf_total) / error).where(lit).max() < 6.0
 
 
+@pytest.mark.filterwarnings("ignore:.*left the finite map sideways")
 def test_wide_sources_on_finite_maps_stay_on_the_map():
     finite = HeightMap(ROUGH.heights, 1.0)
     result = simulate(
