@@ -18,7 +18,7 @@ from pbrdf.kernels.terrain.horizon import NO_HORIZON
 from pbrdf.optics.materials import Material
 from pbrdf.surface.heightmap import HeightMap
 from pbrdf.tracer.field import Field
-from pbrdf.tracer.validity import LEAST_SIZE_PARAMETER
+from pbrdf.validity.contaminants import LEAST_SIZE_PARAMETER
 
 # Without a wavelength bodies are as large against it as geometric optics asks for: no light
 # then crosses one of this kappa, whose optical depth is 4 kappa times the size parameter
