@@ -50,7 +50,8 @@ def check_energy(curves: Sequence[Curve]) -> list[Finding]:
             Finding(
                 name="energy", severity="warning",
                 what=f"the readings integrate to a reflectance of about "
-                f"{max(resolved):.3g} if the lobe is as wide across the plane as in it, at least {low:.3g}",
+                f"{max(resolved):.3g} if the lobe is as wide across the plane as in it, "
+                f"at least {low:.3g}",
                 suspects="too few readings in a narrow lobe, or values in another unit",
                 cure="Compare with a measured total reflectance; --quantity says the unit.",
             )
