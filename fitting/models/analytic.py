@@ -29,7 +29,8 @@ class AnalyticModel:
     model : MicrofacetModel
         Its present values hold for whatever is not free.
     split_slope : bool
-        True if slope_rms_x and slope_rms_y are to be told apart.
+        True if slope_rms_x and slope_rms_y are to be told apart. Their axes may then be
+        turned: `orientation` is the azimuth of the x axis, 0 in the model itself. [rad]
     """
 
     bounds: Mapping[str, tuple[float, float]] = MappingProxyType({})
@@ -51,6 +52,8 @@ class AnalyticModel:
             raise ValueError(msg)
         n, kappa = self.model.material.indices(wavelength)
         values = {"n": n, "kappa": kappa, **self._slopes(), **self._numbers()}
+        if self._split:
+            values["orientation"] = 0.0
         return {
             name: np.broadcast_to(np.asarray(value, dtype=float), geometry.theta_i.shape)
             for name, value in values.items()
@@ -76,7 +79,7 @@ class AnalyticModel:
 
     def updated(self, values: Mapping[str, float]) -> "MicrofacetModel":
         """Return the model with these values."""
-        changes: dict[str, Any] = dict(values)
+        changes: dict[str, Any] = {k: v for k, v in values.items() if k != "orientation"}
         index: dict[str, Any] = {
             name: changes.pop(name) for name in ("n", "kappa") if name in changes
         }
@@ -122,12 +125,14 @@ def _one_geometry(
     from pbrdf.analytic.symbolic import brdf_expression
 
     p, angles = casadi.SX.sym("p", len(names)), casadi.SX.sym("angles", 4)
+    numbers = {name: p[i] for i, name in enumerate(names)}
+    turned = numbers.pop("orientation", 0.0)
     matrix = brdf_expression(
-        {name: p[i] for i, name in enumerate(names)},
+        numbers,
         angles[0],
         angles[1],
         angles[2],
-        phi_i=angles[3],
+        phi_i=angles[3] - turned,
         **dict(zip(_RULES, rules, strict=True)),
     )
     rows = casadi.vec(matrix.T)

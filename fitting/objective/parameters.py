@@ -78,6 +78,7 @@ PARAMETERS: Mapping[str, tuple[float, float, float, str, str]] = {
     "slope_rms": (1e-3, 3.0, 0.1, "1", "rms slope per axis"),
     "slope_rms_x": (1e-3, 3.0, 0.1, "1", "rms slope along x"),
     "slope_rms_y": (1e-3, 3.0, 0.1, "1", "rms slope along y"),
+    "orientation": (-np.pi, np.pi, 0.1, "rad", "azimuth of the x axis of the slopes"),
     "shadow_omega": (1e-3, 10.0, 0.5, "rad", "Maxwell-Beard shadowing, tilt constant"),
     "shadow_tau": (1e-3, 10.0, 0.2, "rad", "Maxwell-Beard shadowing, angle constant"),
     "scale": (0.0, np.inf, 1.0, "1", "goniometer calibration factor on every element"),

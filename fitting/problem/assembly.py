@@ -191,7 +191,8 @@ def _adapter(model: Any, free: Sequence[str]) -> MuellerModel:
     if hasattr(model, "mueller") and hasattr(model, "values"):
         return model
     if hasattr(model, "brdf") and hasattr(model, "slope_rms"):
-        split = any(name in ("slope_rms_x", "slope_rms_y") for name in free)
+        axes = ("slope_rms_x", "slope_rms_y", "orientation")
+        split = any(name in axes for name in free)
         return AnalyticModel(model, split_slope=split)
     msg = f"model must be a MicrofacetModel or a MuellerModel, got {type(model).__name__}."
     raise TypeError(msg)
@@ -252,7 +253,20 @@ def _parameters(
             value, stderr = known[name]
             parameter = replace(parameter, prior_value=value, prior_stderr=stderr)
         parameters.append(_off_bounds(parameter))
+    if "orientation" in layout.column:
+        return _unequal(tuple(parameters))
     return tuple(parameters)
+
+
+def _unequal(parameters: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
+    """Start slopes apart: where both are equal no azimuth is any better than another."""
+    start = {one.name: one.value for one in parameters}
+    if start.get("slope_rms_x") != start.get("slope_rms_y"):
+        return parameters
+    factors = {"slope_rms_x": 1.25, "slope_rms_y": 0.8}
+    return tuple(
+        one.started_at(one.value * factors.get(one.name, 1.0)) for one in parameters
+    )
 
 
 def _within(

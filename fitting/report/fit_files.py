@@ -47,6 +47,7 @@ def write_fit(
         "uncertainty": {name: e.as_dict() for name, e in result.estimates.items()},
         "held": result.held,
         "misfit": {"verdict": result.misfit.verdict, "in_words": str(result.misfit)},
+        "cautions": {"warnings": list(result.warnings)},
         "made_by": record,
     }
     for name, model in _distinct(result).items():

@@ -31,6 +31,8 @@ def identifiability_warnings(
     warnings += [_up_to_a_factor(problem, solved, gauge) for gauge in problem.gauges]
     warnings += _relative_to_what_is_held(problem)
     warnings += _unnamed_wavelengths(problem.observations)
+    warnings += _turned_axes(problem, solved)
+    warnings += _one_slope_for_all_azimuths(problem)
     for direction in found.blind:
         involved = [i for i, part in enumerate(direction) if abs(part) > 0.05]
         names = _listed([labels[i] for i in involved])
@@ -96,6 +98,29 @@ def _unnamed_wavelengths(observations: Observations) -> list[str]:
     return [
         f"{int(unknown.sum())} readings name no wavelength; they were taken as of the "
         f"{waves[0]:g} um of the others"
+    ]
+
+
+def _turned_axes(problem: Problem, solved: Solved) -> list[str]:
+    """Say that the model's own axes lie elsewhere than the sample's."""
+    if "orientation" not in problem.layout.base:
+        return []
+    turned = float(solved.solution.x[problem.layout.base.index("orientation")])
+    return [
+        f"the axes of the slopes are turned by {np.rad2deg(turned):.4g} degrees: give the "
+        f"model phi_i - ({turned:.4g}) rad, it has no azimuth of its own"
+    ]
+
+
+def _one_slope_for_all_azimuths(problem: Problem) -> list[str]:
+    """Say that scans at several azimuths of the source were taken as of one lobe."""
+    geometry = problem.observations.geometry
+    azimuths = np.unique(np.mod(geometry.phi_i[problem.observations.at], np.pi).round(6))
+    if len(azimuths) < 2 or "slope_rms" not in problem.layout.column:
+        return []
+    return [
+        f"the scans have {len(azimuths)} azimuths of the source and one slope_rms; if the "
+        "surface is anisotropic fit slope_rms_x and slope_rms_y"
     ]
 
 
