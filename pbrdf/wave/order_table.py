@@ -22,7 +22,9 @@ ASYMPTOTIC_TERMS = 24
 SERIES_TERMS = 130
 # Smallest share of a peak that is kept: what lies below is rounding of the transform
 FLOOR = 1e-13
-RISES, WAVES = 56, 150
+RISES, WAVES = 64, 220
+# Points of a spectrum that carry it on below the noise
+PARABOLA = 4
 # Least and largest q h over the rises of a table
 LEAST_RISE = 1e-3
 
@@ -56,6 +58,25 @@ def scaled_sums(x: Array, g: float) -> list[Array]:
             total[many] = scale * value - first
     sums = [np.where(x < -LARGE, 0.0, total) for total in sums]
     return sums
+
+
+def above_noise(row: Array, steps: Array) -> Array:
+    """Logarithm of a spectrum, carried on as a parabola where it sinks into rounding.
+
+    No spectrum is negative: negative values tell how large the noise is.
+    """
+    floor = max(FLOOR, 30.0 * max(-row.min(), 0.0))
+    sunk = np.flatnonzero(row < floor)
+    logs = np.log(np.maximum(row, FLOOR))
+    if not sunk.size or sunk[0] < PARABOLA:
+        return logs
+    end = sunk[0]
+    last = slice(end - PARABOLA, end)
+    curve = np.polyfit(steps[last] - steps[end - 1], logs[last], 2)
+    curve[0] = min(curve[0], 0.0)
+    beyond = np.polyval(curve, steps[end:] - steps[end - 1])
+    logs[end:] = np.minimum(beyond, logs[end - 1])
+    return logs
 
 
 class OrderTable:
@@ -106,9 +127,12 @@ class OrderTable:
             g = rise * rise
             rows = np.array(scaled_sums(g * rho, g)) @ transform
             scales[:, i] = rows.max(axis=1)
-            tables[:, i] = np.maximum(rows / scales[:, i, None], FLOOR)
+            tables[:, i] = [
+                above_noise(row / scale, wave_steps)
+                for row, scale in zip(rows, scales[:, i], strict=True)
+            ]
         splines = [
-            interpolate.RectBivariateSpline(np.log(rises), wave_steps, np.log(table))
+            interpolate.RectBivariateSpline(np.log(rises), wave_steps, table)
             for table in tables
         ]
         heights = [

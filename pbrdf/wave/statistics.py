@@ -3,17 +3,18 @@
 from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy import optimize, special
+from scipy import integrate, optimize, special
 
 from pbrdf.errors import require
 from pbrdf.kernels.wave import orders
 
-__all__ = ["Exponential", "Gaussian", "KCorrelation", "Statistics", "panels"]
+__all__ = ["Exponential", "Gaussian", "KCorrelation", "Statistics", "panels", "reach"]
 
 Array = np.ndarray
 
-# Share of the variance that a range of lags or wave vectors may leave out
-TAIL = 1e-13
+# Share of the area that a range of lags may leave out: the orders above the first see the
+# square of the autocorrelation and its higher powers
+TAIL = 1e-10
 # Nodes of a panel of the quadratures below
 PANEL_NODES = 16
 
@@ -71,10 +72,15 @@ class Statistics:
 
     @cached_property
     def farthest_lag(self) -> float:
-        """Lag beyond which the square of the autocorrelation is below rounding. [um]"""
-        lags = self.corr_length * np.geomspace(1.0, 1e4, 2000)
-        above = np.flatnonzero(np.abs(self.correlation(lags)) > np.sqrt(TAIL))
-        return float(lags[min(above[-1] + 1, lags.size - 1)]) if above.size else lags[0]
+        """Lag beyond which the square of the autocorrelation has no area left. [um]"""
+        lags = self.corr_length * np.geomspace(1e-3, 1e3, 3000)
+        return reach(lags, self.correlation(lags))
+
+
+def reach(lags: Array, correlation: Array) -> float:
+    """Lag beyond which the square of a correlation has a share TAIL of its area."""
+    area = integrate.cumulative_trapezoid(correlation**2 * lags, lags, initial=0.0)
+    return float(lags[min(np.searchsorted(area, (1 - TAIL) * area[-1]) + 1, lags.size - 1)])
 
 
 class Gaussian(Statistics):

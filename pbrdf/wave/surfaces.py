@@ -14,6 +14,7 @@ from pbrdf.wave.statistics import (
     KCorrelation,
     Statistics,
     panels,
+    reach,
 )
 
 __all__ = ["FORMS", "FromCorrelation", "FromDensity", "heights_of"]
@@ -26,6 +27,10 @@ FORMS = {
     "k-correlation": "power-law (ABC) spectrum of a given exponent",
 }
 LAGS, WAVES = 600, 400
+# A function of the lag is transformed as far as it is larger than this
+SMALLEST_KNOWN = 1e-9
+# Where a correlation has been this small for so many lags, there is nothing more
+SMALLEST_CORRELATION, QUIET = 1e-4, 40
 # Difference of height_rms and the integral of a density that rounding and the finite range
 # of a measurement may explain; a forgotten side or 2 pi makes 30 % at least
 HEIGHT_TOLERANCE = 0.05
@@ -39,7 +44,7 @@ class FromCorrelation(Statistics):
         farthest: float,
     ) -> None:  # fmt: skip
         self._rho = rho
-        self._farthest = farthest
+        self._last = farthest
         self._spectra: dict[int, tuple[Array, Any, float]] = {}
         length = one_over_e(rho, farthest) if corr_length is None else corr_length
         super().__init__(height_rms, length)
@@ -47,11 +52,6 @@ class FromCorrelation(Statistics):
     def correlation(self, lag: Array) -> Array:
         """See `Statistics`."""
         return np.asarray(self._rho(np.abs(lag)))
-
-    @cached_property
-    def farthest_lag(self) -> float:
-        """See `Statistics`."""
-        return self._farthest
 
     def spectrum(self, wave_vector: Array, dimensions: int) -> Array:
         """See `Statistics`; negative parts, which no surface has, are cut."""
@@ -65,7 +65,7 @@ class FromCorrelation(Statistics):
 
     def _transformed(self, dimensions: int) -> tuple[Array, Any, float]:
         """Spline of the spectrum over arcsinh(K l)."""
-        length, far = self.corr_length, self.farthest_lag
+        length, far = self.corr_length, self._last
         largest = 3e3 / far + 60.0 / length
         steps = np.linspace(0.0, np.arcsinh(largest * length), WAVES)
         wave = np.sinh(steps) / length
@@ -97,13 +97,20 @@ class FromDensity(Statistics):
         density = self._at(f) * weight
         density = 2.0 * density if dimensions == 1 else 2.0 * np.pi * f * density
         height = float(np.sqrt(density.sum()))
-        far = 6.0 / frequency[0]
-        lags = np.r_[0.0, np.geomspace(0.01 / frequency[-1], far, LAGS)]
         kernel = np.cos if dimensions == 1 else special.j0
-        values = np.array([(kernel(2 * np.pi * f * x) * density).sum() for x in lags])
-        rho = interpolate.CubicSpline(lags, values / values[0])
-        self._rho = rho
-        self._farthest = far
+        lags, values = [0.0], [height**2]
+        quiet = 0
+        # As far as it is more than noise
+        for lag in np.geomspace(0.01 / frequency[-1], 6.0 / frequency[0], LAGS):
+            lags.append(float(lag))
+            values.append(float((kernel(2 * np.pi * f * lag) * density).sum()))
+            quiet = quiet + 1 if abs(values[-1]) < SMALLEST_CORRELATION * values[0] else 0
+            if quiet == QUIET:
+                break
+        known = np.array(lags)
+        rho = interpolate.CubicSpline(known, np.array(values) / values[0])
+        far = reach(known[1:], rho(known[1:]))
+        self._rho, self._farthest = rho, far
         super().__init__(height, one_over_e(rho, far))
 
     def _at(self, frequency: Array) -> Array:
@@ -235,7 +242,7 @@ def _from_correlation(rho: Any, height_rms: float, corr_length: float | None) ->
             raise ValueError(msg)
         start = corr_length if corr_length is not None else 1.0
         lags = start * np.geomspace(1e-3, 1e5, 4000)
-        above = np.flatnonzero(np.abs(rho(lags)) > 1e-7)
+        above = np.flatnonzero(np.abs(rho(lags)) > SMALLEST_KNOWN)
         farthest = float(lags[min(above[-1] + 1, lags.size - 1)])
         length = one_over_e(rho, farthest)
         if corr_length is not None and abs(length / corr_length - 1.0) > 0.01:

@@ -7,28 +7,33 @@ is an amplitude 2i B h(K) / cos(theta_s). Elements are ordered (ss, sp, ps, pp),
 in.
 """
 
-import cmath
 from collections import namedtuple
 from math import sqrt
 
+import numpy as np
+
 from pbrdf.kernels import jit
+from pbrdf.kernels.optics.fresnel import wave_normal
 
 __all__ = [
     "LEAST_COSINE",
     "Medium",
     "Ray",
-    "curvature_change",
+    "curvature_changes",
     "first_order",
     "lateral_ray",
+    "medium_of",
     "tangent_plane",
+    "turn_between",
 ]
 
 # Lateral wave vector as its length and azimuth, and the normal component: sin, cos of the
 # zenith, cos and sin of the azimuth of propagation
 Ray = namedtuple("Ray", "sin cos along across")
 
-# eps = N^2, and whether it is the perfect conductor (eps is not read then)
-Medium = namedtuple("Medium", "eps perfect")
+# n, kappa, eps = (n + i kappa)^2, and whether it is the perfect conductor (n, kappa and eps
+# are not read then)
+Medium = namedtuple("Medium", "n kappa eps perfect")
 
 # Least cosine of a ray: on the horizon itself some ratios would be 0/0
 LEAST_COSINE = 1e-9
@@ -37,7 +42,23 @@ LEAST_COSINE = 1e-9
 PLANELESS = 1e-22
 
 
-@jit
+@jit(forceinline=True)
+def medium_of(n, kappa):
+    """Medium of an index; n = inf is the perfect conductor."""
+    perfect = n == np.inf
+    real = 1.0 if perfect else n
+    index = complex(real, kappa)
+    return Medium(real, kappa, index * index, perfect)
+
+
+@jit(forceinline=True)
+def inverse(z):
+    """1/z, which no guard against zero slows down: no caller has one."""
+    scale = 1.0 / (z.real * z.real + z.imag * z.imag)
+    return complex(scale * z.real, -scale * z.imag)
+
+
+@jit(forceinline=True)
 def lateral_ray(x, y):
     """Ray of a lateral wave vector; behind the horizon it is laid on it."""
     length = sqrt(x * x + y * y)
@@ -60,10 +81,11 @@ def turn_between(ray_in, ray_out):
 @jit(forceinline=True)
 def normal_inside(ray, medium):
     """Return the normal component behind the interface, sqrt(eps - sin^2)."""
-    return cmath.sqrt(medium.eps - 1.0 + ray.cos * ray.cos)
+    real, imag = wave_normal(ray.cos, medium.n, medium.kappa)
+    return complex(real, imag)
 
 
-@jit
+@jit(forceinline=True)
 def first_order(ray_in, ray_out, medium):
     """Small-perturbation kernel of Rice in all four elements, times both cosines.
 
@@ -82,8 +104,8 @@ def first_order(ray_in, ray_out, medium):
     eps = medium.eps
     in_s, in_i = normal_inside(ray_out, medium), normal_inside(ray_in, medium)
     # Waves that an s or p field drives, out and in
-    out_s, out_p = cos_s / (cos_s + in_s), cos_s / (eps * cos_s + in_s)
-    into_s, into_p = cos_i / (cos_i + in_i), cos_i / (eps * cos_i + in_i)
+    out_s, out_p = cos_s * inverse(cos_s + in_s), cos_s * inverse(eps * cos_s + in_s)
+    into_s, into_p = cos_i * inverse(cos_i + in_i), cos_i * inverse(eps * cos_i + in_i)
     excess = eps - 1.0
     return (
         excess * turn * out_s * into_s,
@@ -93,7 +115,7 @@ def first_order(ray_in, ray_out, medium):
     )
 
 
-@jit
+@jit(forceinline=True)
 def tangent_plane(ray_in, ray_out, medium):
     """Kirchhoff kernel with Fresnel at the facet that mirrors, times both cosines.
 
@@ -132,34 +154,33 @@ def facet_amplitudes(cos_beta, sin2_beta, medium):
     """Fresnel's r_s, r_p in the forms in which nothing cancels."""
     if medium.perfect:
         return complex(-1.0, 0.0), complex(1.0, 0.0)
-    inside = cmath.sqrt(medium.eps - 1.0 + cos_beta * cos_beta)
+    real, imag = wave_normal(cos_beta, medium.n, medium.kappa)
+    inside = complex(real, imag)
     forward = cos_beta + inside
-    if forward == 0.0:
-        return complex(0.0, 0.0), complex(0.0, 0.0)
-    r_s = (1.0 - medium.eps) / (forward * forward)
-    r_p = r_s * (sin2_beta - inside * cos_beta) / (sin2_beta + inside * cos_beta)
+    # An index-matched facet at grazing reflects nothing; it would be 0/0
+    r_s = (1.0 - medium.eps) * inverse(forward * forward + 1e-300)
+    bend = inside * cos_beta
+    r_p = r_s * (sin2_beta - bend) * inverse(sin2_beta + bend)
     return r_s, r_p
 
 
-@jit
-def curvature_change(ray_in, ray_out, shift_x, shift_y, medium):
-    """First-order less tangent-plane kernel where the surface adds a wave vector `shift`.
-
-    Taken at the mean of the two lateral vectors, plus and minus half the shift, and turned
-    into the frames of the rays given.
-    """
-    middle_x = 0.5 * (ray_out.sin * ray_out.along + ray_in.sin * ray_in.along)
-    middle_y = 0.5 * (ray_out.sin * ray_out.across + ray_in.sin * ray_in.across)
-    to = lateral_ray(middle_x + 0.5 * shift_x, middle_y + 0.5 * shift_y)
-    come = lateral_ray(middle_x - 0.5 * shift_x, middle_y - 0.5 * shift_y)
-    rice, plane = first_order(come, to, medium), tangent_plane(come, to, medium)
-    ss, sp, ps, pp = (
+@jit(forceinline=True)
+def difference(ray_in, ray_out, medium):
+    """First-order less tangent-plane kernel, in the frames of the two rays."""
+    rice = first_order(ray_in, ray_out, medium)
+    plane = tangent_plane(ray_in, ray_out, medium)
+    return (
         rice[0] - plane[0],
         rice[1] - plane[1],
         rice[2] - plane[2],
         rice[3] - plane[3],
     )
-    # Outgoing frame, then incoming
+
+
+@jit(forceinline=True)
+def turned(jones, ray_in, ray_out, come, to):
+    """Jones matrix from `come` to `to`, in the frames of the azimuths of two other rays."""
+    ss, sp, ps, pp = jones
     cos_o, sin_o = turn_between(ray_out, to)
     ss, ps = ss * cos_o - ps * sin_o, ss * sin_o + ps * cos_o
     sp, pp = sp * cos_o - pp * sin_o, sp * sin_o + pp * cos_o
@@ -167,3 +188,22 @@ def curvature_change(ray_in, ray_out, shift_x, shift_y, medium):
     ss, sp = ss * cos_n + sp * sin_n, sp * cos_n - ss * sin_n
     ps, pp = ps * cos_n + pp * sin_n, pp * cos_n - ps * sin_n
     return ss, sp, ps, pp
+
+
+@jit
+def curvature_changes(ray_in, ray_out, shift_x, shift_y, medium):
+    """First-order less tangent-plane kernel where the surface adds a wave vector +-shift.
+
+    Taken at the mean of the two lateral vectors, plus and minus half the shift, and turned
+    into the frames of the rays given. The second has the rays exchanged: by reciprocity
+    ss and pp are the same, sp and ps change places and sign.
+    """
+    middle_x = 0.5 * (ray_out.sin * ray_out.along + ray_in.sin * ray_in.along)
+    middle_y = 0.5 * (ray_out.sin * ray_out.across + ray_in.sin * ray_in.across)
+    to = lateral_ray(middle_x + 0.5 * shift_x, middle_y + 0.5 * shift_y)
+    come = lateral_ray(middle_x - 0.5 * shift_x, middle_y - 0.5 * shift_y)
+    ss, sp, ps, pp = difference(come, to, medium)
+    return (
+        turned((ss, sp, ps, pp), ray_in, ray_out, come, to),
+        turned((ss, -ps, -sp, pp), ray_in, ray_out, to, come),
+    )

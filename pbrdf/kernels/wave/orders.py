@@ -11,6 +11,7 @@ from math import exp, log, log1p, sqrt
 import numpy as np
 
 from pbrdf.kernels import jit
+from pbrdf.kernels.optics.elementary import exp as fast_exp
 
 __all__ = ["EXPONENTIAL", "GAUSSIAN", "fill_moments"]
 
@@ -27,9 +28,11 @@ TWO_PI = 2.0 * np.pi
 def heaviest_order(g, kappa):
     """Order where g^n/n! exp(-kappa/n) is largest, from n^2 ln(n/g) = kappa."""
     target = 2.0 * kappa / (g * g)
+    if target < 0.1:
+        return g * (1.0 + 0.5 * target)
     # Newton's steps for y ln y = target, y = (n/g)^2
     y = 1.0 + target / (1.0 + log1p(target))
-    for _ in range(8):
+    for _ in range(5):
         y = (y + target) / (1.0 + log(y))
     return g * sqrt(y)
 
@@ -56,38 +59,50 @@ def poisson_weight(n, g):
 
 
 @jit(forceinline=True)
-def spectrum_of_order(law, dimensions, n, kappa):
-    """Spectrum of the n-th power over that of a unit length; kappa = (K l)^2/4."""
+def spectrum_of_order(law, dimensions, inverse, kappa):
+    """Spectrum of the power n = 1/inverse over that of a unit length; kappa = (K l)^2/4."""
     if law == GAUSSIAN:
-        exponent = -kappa / n
-        bell = 0.0 if exponent < LEAST_EXPONENT else exp(exponent)
-        return bell * (sqrt(np.pi / n) if dimensions == 1 else np.pi / n)
-    square = n * n + 4.0 * kappa
-    return 2.0 * n / square if dimensions == 1 else TWO_PI * n / (square * sqrt(square))
+        bell = fast_exp(-kappa * inverse)
+        return bell * (sqrt(np.pi * inverse) if dimensions == 1 else np.pi * inverse)
+    fall = 1.0 / (1.0 + 4.0 * kappa * inverse * inverse)
+    if dimensions == 1:
+        return 2.0 * inverse * fall
+    return TWO_PI * inverse * inverse * fall * sqrt(fall)
+
+
+@jit(forceinline=True)
+def window(law, g, kappa):
+    """First and last order and the step of a sum that leaves nothing out."""
+    gaussian = law == GAUSSIAN
+    middle = max(heaviest_order(g, kappa) if gaussian else g, 1.0)
+    curvature = 1.0 / middle
+    if gaussian:
+        curvature *= 1.0 + 2.0 * kappa / (middle * middle)
+    width = 1.0 / sqrt(curvature)
+    first, last = np.floor(middle - REACH * width), middle + REACH * width + 14.0
+    if first < 12.0:
+        return 1.0, last, 1.0
+    return first, last, max(np.floor(width / TERMS_IN_WIDTH), 1.0)
 
 
 @jit
 def order_moments(law, dimensions, g, kappa):
     """Sum weight, spectrum and n^2, n, 1, 1/n or 1/n^2 over n, the length being 1."""
-    middle = max(heaviest_order(g, kappa) if law == GAUSSIAN else g, 1.0)
-    width = 1.0 / sqrt(1.0 / middle + (2.0 * kappa / middle**3 if law == GAUSSIAN else 0.0))
-    last = middle + REACH * width + 14.0
-    first, step = 1.0, 1.0
-    if middle - REACH * width > 12.0:
-        step = max(np.floor(width / TERMS_IN_WIDTH), 1.0)
-        first = np.floor(middle - REACH * width)
+    first, last, step = window(law, g, kappa)
     term_by_term = first == 1.0
     weight = exp(-g) if g < 700.0 else 0.0
     rising, mean, total, falling, steep = 0.0, 0.0, 0.0, 0.0, 0.0
     n = first
     while n <= last:
-        weight = weight * g / n if term_by_term else poisson_weight(n, g)
-        term = step * weight * spectrum_of_order(law, dimensions, n, kappa)
+        inverse = 1.0 / n
+        weight = weight * g * inverse if term_by_term else step * poisson_weight(n, g)
+        term = weight * spectrum_of_order(law, dimensions, inverse, kappa)
+        less, more = term * inverse, term * n
         total += term
-        mean += n * term
-        rising += n * n * term
-        falling += term / n
-        steep += term / (n * n)
+        mean += more
+        rising += n * more
+        falling += less
+        steep += less * inverse
         n += step
     return rising, mean, total, falling, steep
 

@@ -5,9 +5,9 @@ import numpy as np
 from pbrdf.kernels import jit
 from pbrdf.kernels.wave.amplitudes import (
     LEAST_COSINE,
-    Medium,
     Ray,
     first_order,
+    medium_of,
     tangent_plane,
 )
 from pbrdf.kernels.wave.scatter import HORIZON, shadowing
@@ -31,14 +31,6 @@ def kernels_between(lateral_in, lateral_out, medium):
     rice = first_order(ray_in, ray_out, medium)
     plane = tangent_plane(ray_in, ray_out, medium)
     return scale * rice[0], scale * rice[3], scale * plane[0], scale * plane[3]
-
-
-@jit
-def medium_of(n, kappa):
-    """Medium of an index; n = inf is the perfect conductor."""
-    perfect = n == np.inf
-    index = complex(1.0 if perfect else n, kappa)
-    return Medium(index * index, perfect)
 
 
 @jit

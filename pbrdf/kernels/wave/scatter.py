@@ -14,11 +14,12 @@ from pbrdf.kernels import jit
 from pbrdf.kernels.optics.elementary import erf, exp
 from pbrdf.kernels.wave.amplitudes import (
     LEAST_COSINE,
-    Medium,
     Ray,
-    curvature_change,
+    curvature_changes,
     first_order,
+    medium_of,
     tangent_plane,
+    turn_between,
 )
 
 __all__ = [
@@ -156,12 +157,11 @@ def with_curvature(ray_in, ray_out, medium, plan, surface, moments, changes):
     mean = combined(0.0, plane, 0.0, plane, 0.0, plane)
     for k in range(pairs):
         x, y = node(plan, k, surface.spread, ray_in, ray_out)
-        for way in range(2):
-            sign = 1.0 - 2.0 * way
-            there = curvature_change(ray_in, ray_out, sign * x, sign * y, medium)
-            for element in range(4):
-                changes[2 * k + way, element] = there[element]
-            mean = combined(1.0, mean, weight, there, 0.0, there)
+        there, back = curvature_changes(ray_in, ray_out, x, y, medium)
+        for element in range(4):
+            changes[2 * k, element] = there[element]
+            changes[2 * k + 1, element] = back[element]
+        mean = combined(1.0, mean, weight, there, weight, back)
     # Scatter about the mean; the node at zero has d = 0
     scatter = max(moments[1] - moments[2], 0.0)
     sums = added(nothing(), scatter * (1.0 - 2 * pairs * weight), mean)
@@ -203,21 +203,12 @@ def shadowing(ray_in, ray_out, slope):
 
     Between them the weight of van Ginneken et al., Appl. Opt. 37, 130 (1998).
     """
-    turn, side = turn_of(ray_in, ray_out)
+    turn, side = turn_between(ray_in, ray_out)
     azimuth = np.pi - np.arctan2(abs(side), turn)
     weight = azimuth * (1.0 + 4.41 * np.pi) / (np.pi * (1.0 + 4.41 * azimuth))
     one = overhang(ray_in.cos, ray_in.sin, slope)
     other = overhang(ray_out.cos, ray_out.sin, slope)
     return 1.0 / (1.0 + max(one, other) + weight * min(one, other))
-
-
-@jit(forceinline=True)
-def turn_of(ray_in, ray_out):
-    """Cosine and sine of the azimuth between the rays."""
-    return (
-        ray_out.along * ray_in.along + ray_out.across * ray_in.across,
-        ray_out.across * ray_in.along - ray_out.along * ray_in.across,
-    )
 
 
 @jit(forceinline=True)
@@ -275,9 +266,7 @@ def fill_scattering(angles, indices, statistics, moments, retardance, plan, out)
         ray_in = Ray(np.sin(angles[0, k]), cos_i, 1.0, 0.0)
         turn, side = -np.cos(angles[2, k]), -np.sin(angles[2, k])
         ray_out = Ray(np.sin(angles[1, k]), cos_s, turn, side)
-        perfect = indices[0, k] == np.inf
-        index = complex(1.0 if perfect else indices[0, k], indices[1, k])
-        medium = Medium(index * index, perfect)
+        medium = medium_of(indices[0, k], indices[1, k])
         rise = cos_i + cos_s
         height = statistics[0, k] * rise
         surface = Surface(height * height, statistics[1, k], statistics[2, k])
