@@ -68,6 +68,7 @@ class Scattering:
         if not size:
             return out
         spreads = self._spreads(columns[3])
+        self._warn_of_slopes(spreads)
         phases = self._retardance(columns)
         moments = self._moments(2 * np.pi / columns[3].min())
         plan = Plan(self.method.kernel, self.dimensions, self.method.shadowed)
@@ -135,11 +136,19 @@ class Scattering:
         r_s = (cosine - inside) / (cosine + inside)
         return fall * np.array([r_s, (eps * cosine - inside) / (eps * cosine + inside)])
 
+    def slopes(self, wavelength: Array) -> Array:
+        """Rms slope of the heights that a wave can resolve, of each wavelength. [1]"""
+        return self._spreads(wavelength) * self.heights.height_rms
+
     def _spreads(self, wavelength: Array) -> Array:
         """Rms wave vector per axis of the heights that a wave can resolve. [rad/um]"""
         found, where = np.unique(wavelength, return_inverse=True)
         limits = 4 * np.pi / found
         spreads = np.array([self.heights.spread(v, self.dimensions) for v in limits])
+        return spreads[where.ravel()]
+
+    def _warn_of_slopes(self, spreads: Array) -> None:
+        """Say that second bounces are missing where the surface is steep."""
         steepest = spreads.max() * self.heights.height_rms
         if steepest > STEEPEST and self.name in SLOPED:
             warnings.warn(
@@ -147,7 +156,6 @@ class Scattering:
                 "later bounces, 5 % of the power or more, is missing. simulate has it.",
                 AccuracyWarning, stacklevel=4,
             )  # fmt: skip
-        return spreads[where]
 
     def _moments(self, largest_k: float) -> Moments:
         """Give the function of (k, q/k, K/k, statistics) that sums over the orders."""

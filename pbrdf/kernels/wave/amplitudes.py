@@ -52,6 +52,18 @@ def medium_of(n, kappa):
 
 
 @jit(forceinline=True)
+def times(factor, z):
+    """Return a real multiple of z; a product of types would be one of complex numbers."""
+    return complex(factor * z.real, factor * z.imag)
+
+
+@jit(forceinline=True)
+def blend(a, x, b, y):
+    """Return a x + b y with real a and b."""
+    return complex(a * x.real + b * y.real, a * x.imag + b * y.imag)
+
+
+@jit(forceinline=True)
 def inverse(z):
     """1/z, which no guard against zero slows down: no caller has one."""
     scale = 1.0 / (z.real * z.real + z.imag * z.imag)
@@ -104,14 +116,16 @@ def first_order(ray_in, ray_out, medium):
     eps = medium.eps
     in_s, in_i = normal_inside(ray_out, medium), normal_inside(ray_in, medium)
     # Waves that an s or p field drives, out and in
-    out_s, out_p = cos_s * inverse(cos_s + in_s), cos_s * inverse(eps * cos_s + in_s)
-    into_s, into_p = cos_i * inverse(cos_i + in_i), cos_i * inverse(eps * cos_i + in_i)
-    excess = eps - 1.0
+    out_s, out_p = inverse(in_s + cos_s), inverse(blend(cos_s, eps, 1.0, in_s))
+    into_s, into_p = inverse(in_i + cos_i), inverse(blend(cos_i, eps, 1.0, in_i))
+    excess = times(cos_s * cos_i, eps - 1.0)
+    along = blend(ray_out.sin * ray_in.sin, eps, -turn, in_s * in_i)
+    from_s, from_p = excess * into_s, excess * into_p
     return (
-        excess * turn * out_s * into_s,
-        -excess * side * in_i * out_s * into_p,
-        -excess * side * in_s * out_p * into_s,
-        excess * (eps * ray_out.sin * ray_in.sin - in_s * in_i * turn) * out_p * into_p,
+        times(turn, out_s * from_s),
+        times(-side, in_i * out_s * from_p),
+        times(-side, in_s * out_p * from_s),
+        along * out_p * from_p,
     )
 
 
@@ -133,19 +147,21 @@ def tangent_plane(ray_in, ray_out, medium):
     plane = out_s * out_s + out_p * out_p
     if plane < PLANELESS:
         # Straight back: the field keeps its direction and takes r_s
-        scale = -cos2 * r_s
+        scale = times(-cos2, r_s)
         return (
-            scale * turn,
-            -scale * side * cos_i,
-            -scale * side * cos_s,
-            scale * (sin_s * sin_i - cos_s * cos_i * turn),
+            times(turn, scale),
+            times(-side * cos_i, scale),
+            times(-side * cos_s, scale),
+            times(sin_s * sin_i - cos_s * cos_i * turn, scale),
         )
     scale = -cos2 / plane
+    pp, ss = scale * out_p * in_p, scale * out_s * in_s
+    ps, sp = scale * out_p * in_s, scale * out_s * in_p
     return (
-        -scale * (out_p * in_p * r_s + out_s * in_s * r_p),
-        scale * (out_p * in_s * r_s - out_s * in_p * r_p),
-        scale * (out_s * in_p * r_s - out_p * in_s * r_p),
-        -scale * (out_s * in_s * r_s + out_p * in_p * r_p),
+        blend(-pp, r_s, -ss, r_p),
+        blend(ps, r_s, -sp, r_p),
+        blend(sp, r_s, -ps, r_p),
+        blend(-ss, r_s, -pp, r_p),
     )
 
 
@@ -159,7 +175,7 @@ def facet_amplitudes(cos_beta, sin2_beta, medium):
     forward = cos_beta + inside
     # An index-matched facet at grazing reflects nothing; it would be 0/0
     r_s = (1.0 - medium.eps) * inverse(forward * forward + 1e-300)
-    bend = inside * cos_beta
+    bend = times(cos_beta, inside)
     r_p = r_s * (sin2_beta - bend) * inverse(sin2_beta + bend)
     return r_s, r_p
 
@@ -182,11 +198,11 @@ def turned(jones, ray_in, ray_out, come, to):
     """Jones matrix from `come` to `to`, in the frames of the azimuths of two other rays."""
     ss, sp, ps, pp = jones
     cos_o, sin_o = turn_between(ray_out, to)
-    ss, ps = ss * cos_o - ps * sin_o, ss * sin_o + ps * cos_o
-    sp, pp = sp * cos_o - pp * sin_o, sp * sin_o + pp * cos_o
+    ss, ps = blend(cos_o, ss, -sin_o, ps), blend(sin_o, ss, cos_o, ps)
+    sp, pp = blend(cos_o, sp, -sin_o, pp), blend(sin_o, sp, cos_o, pp)
     cos_n, sin_n = turn_between(ray_in, come)
-    ss, sp = ss * cos_n + sp * sin_n, sp * cos_n - ss * sin_n
-    ps, pp = ps * cos_n + pp * sin_n, pp * cos_n - ps * sin_n
+    ss, sp = blend(cos_n, ss, sin_n, sp), blend(cos_n, sp, -sin_n, ss)
+    ps, pp = blend(cos_n, ps, sin_n, pp), blend(cos_n, pp, -sin_n, ps)
     return ss, sp, ps, pp
 
 

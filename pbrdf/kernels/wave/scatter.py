@@ -15,6 +15,7 @@ from pbrdf.kernels.optics.elementary import erf, exp
 from pbrdf.kernels.wave.amplitudes import (
     LEAST_COSINE,
     Ray,
+    blend,
     curvature_changes,
     first_order,
     medium_of,
@@ -55,31 +56,46 @@ HEXAGON = ((2.0, 0.0), (1.0, SQRT_3), (-1.0, SQRT_3))
 
 
 @jit(forceinline=True)
-def added(sums, weight, jones):
-    """Return sums of the products of Jones elements with those of one more matrix."""
-    ss, sp, ps, pp = jones
-    return (
-        sums[0] + weight * (ss.real * ss.real + ss.imag * ss.imag),
-        sums[1] + weight * (sp.real * sp.real + sp.imag * sp.imag),
-        sums[2] + weight * (ps.real * ps.real + ps.imag * ps.imag),
-        sums[3] + weight * (pp.real * pp.real + pp.imag * pp.imag),
-        sums[4] + weight * ss * sp.conjugate(),
-        sums[5] + weight * ps * pp.conjugate(),
-        sums[6] + weight * ss * ps.conjugate(),
-        sums[7] + weight * sp * pp.conjugate(),
-        sums[8] + weight * ss * pp.conjugate(),
-        sums[9] + weight * sp * ps.conjugate(),
+def power(z):
+    """Squared modulus."""
+    return z.real * z.real + z.imag * z.imag
+
+
+@jit(forceinline=True)
+def product(weight, a, b):
+    """Return weight a b* with a real weight."""
+    return complex(
+        weight * (a.real * b.real + a.imag * b.imag),
+        weight * (a.imag * b.real - a.real * b.imag),
     )
 
 
 @jit(forceinline=True)
-def combined(a, jones_a, b, jones_b, c, jones_c):
-    """Linear combination of three Jones matrices."""
+def added(sums, weight, jones):
+    """Return sums of the products of Jones elements with those of one more matrix."""
+    ss, sp, ps, pp = jones
     return (
-        a * jones_a[0] + b * jones_b[0] + c * jones_c[0],
-        a * jones_a[1] + b * jones_b[1] + c * jones_c[1],
-        a * jones_a[2] + b * jones_b[2] + c * jones_c[2],
-        a * jones_a[3] + b * jones_b[3] + c * jones_c[3],
+        sums[0] + weight * power(ss),
+        sums[1] + weight * power(sp),
+        sums[2] + weight * power(ps),
+        sums[3] + weight * power(pp),
+        sums[4] + product(weight, ss, sp),
+        sums[5] + product(weight, ps, pp),
+        sums[6] + product(weight, ss, ps),
+        sums[7] + product(weight, sp, pp),
+        sums[8] + product(weight, ss, pp),
+        sums[9] + product(weight, sp, ps),
+    )
+
+
+@jit(forceinline=True)
+def combined(a, jones_a, b, jones_b):
+    """Linear combination of two Jones matrices with real factors."""
+    return (
+        blend(a, jones_a[0], b, jones_b[0]),
+        blend(a, jones_a[1], b, jones_b[1]),
+        blend(a, jones_a[2], b, jones_b[2]),
+        blend(a, jones_a[3], b, jones_b[3]),
     )
 
 
@@ -88,6 +104,13 @@ def nothing():
     """Begin sums with no matrix at all."""
     zero = complex(0.0, 0.0)
     return 0.0, 0.0, 0.0, 0.0, zero, zero, zero, zero, zero, zero
+
+
+@jit(forceinline=True)
+def no_jones():
+    """Jones matrix that stops all light."""
+    zero = complex(0.0, 0.0)
+    return zero, zero, zero, zero
 
 
 @jit
@@ -105,9 +128,10 @@ def over_orders(sums, plain, per_order, mean, moments):
     spread_b = sqrt(max(rising - b * b, 0.0))
     coupling = (total - b * c) / spread_b if spread_b > 1e-7 * sqrt(rising) else 0.0
     spread_c = sqrt(max(steep - c * c - coupling * coupling, 0.0))
-    sums = added(sums, 1.0, combined(root, plain, b, mean, c, per_order))
-    sums = added(sums, 1.0, combined(0.0, plain, spread_b, mean, coupling, per_order))
-    return added(sums, 1.0, combined(0.0, plain, 0.0, mean, spread_c, per_order))
+    whole = combined(1.0, combined(root, plain, b, mean), c, per_order)
+    sums = added(sums, 1.0, whole)
+    sums = added(sums, 1.0, combined(spread_b, mean, coupling, per_order))
+    return added(sums, spread_c * spread_c, per_order)
 
 
 @jit(forceinline=True)
@@ -154,22 +178,22 @@ def with_curvature(ray_in, ray_out, medium, plan, surface, moments, changes):
     rice = first_order(ray_in, ray_out, medium)
     line = plan.dimensions == 1
     pairs, weight = (1, LINE_WEIGHT) if line else (3, HEXAGON_WEIGHT)
-    mean = combined(0.0, plane, 0.0, plane, 0.0, plane)
+    mean = no_jones()
     for k in range(pairs):
         x, y = node(plan, k, surface.spread, ray_in, ray_out)
         there, back = curvature_changes(ray_in, ray_out, x, y, medium)
         for element in range(4):
             changes[2 * k, element] = there[element]
             changes[2 * k + 1, element] = back[element]
-        mean = combined(1.0, mean, weight, there, weight, back)
+        mean = combined(1.0, mean, weight, combined(1.0, there, 1.0, back))
     # Scatter about the mean; the node at zero has d = 0
     scatter = max(moments[1] - moments[2], 0.0)
     sums = added(nothing(), scatter * (1.0 - 2 * pairs * weight), mean)
     for k in range(2 * pairs):
         there = (changes[k, 0], changes[k, 1], changes[k, 2], changes[k, 3])
-        sums = added(sums, scatter * weight, combined(1.0, there, -1.0, mean, 0.0, mean))
-    change = combined(1.0, rice, -1.0, plane, 0.0, plane)
-    plain = combined(1.0, plane, -(1.0 + surface.g), mean, 0.0, mean)
+        sums = added(sums, scatter * weight, combined(1.0, there, -1.0, mean))
+    change = combined(1.0, rice, -1.0, plane)
+    plain = combined(1.0, plane, -(1.0 + surface.g), mean)
     return over_orders(sums, plain, change, mean, moments)
 
 
@@ -184,9 +208,8 @@ def scattered_sums(ray_in, ray_out, medium, plan, surface, moments, changes):
     if plan.kernel == TANGENT:
         return added(nothing(), moments[2], plane)
     rice = first_order(ray_in, ray_out, medium)
-    change = combined(1.0, rice, -1.0, plane, 0.0, plane)
-    no_mean = combined(0.0, plane, 0.0, plane, 0.0, plane)
-    return over_orders(nothing(), plane, change, no_mean, moments)
+    change = combined(1.0, rice, -1.0, plane)
+    return over_orders(nothing(), plane, change, no_jones(), moments)
 
 
 @jit(forceinline=True)
