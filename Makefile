@@ -5,13 +5,14 @@
 #   make test     the tests that take seconds; test-all adds the slow ones
 #   make lint     style, types and the layer rule
 #   make stability  the table of numerical hazards with what was measured of each
+#   make fuzz     damaged files of every format against the readers (COUNT=10000)
 #   make bench    accuracy and speed as ratios        make studies   the study folders
 #   make docs     the documentation as a web site     make lock      renew the locks
 
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo demo-seeds test test-all lint stability bench studies docs lock clean
+.PHONY: help demo demo-seeds test test-all lint stability fuzz bench studies docs lock clean
 
 # The first interpreter that starts and is new enough; set PYTHON to choose another
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
@@ -68,6 +69,10 @@ stability: .venv/.dev
 		tests/laws/test_tracer_symmetry.py tests/statistical/test_tracer_error_bars.py \
 		tests/analytic/test_tracer_facets.py tests/contaminants/test_films.py \
 		tests/contaminants/test_drops_exact.py
+
+COUNT ?= 2000
+fuzz: .venv/.dev
+	PYTHONPATH=. $(BIN)/python tests/fuzz/run.py --count $(COUNT)
 
 bench: .venv/.all
 	$(BIN)/python -m pytest -m bench -s
