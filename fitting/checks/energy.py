@@ -49,7 +49,7 @@ def check_energy(curves: Sequence[Curve]) -> list[Finding]:
         return [
             Finding(
                 name="energy", severity="warning",
-                what=f"the readings integrate to a reflectance of about "
+                what="the readings integrate to a reflectance of about "
                 f"{max(resolved):.3g} if the lobe is as wide across the plane as in it, "
                 f"at least {low:.3g}",
                 suspects="too few readings in a narrow lobe, or values in another unit",

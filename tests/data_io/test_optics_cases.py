@@ -287,3 +287,28 @@ def test_what_writes_and_reads_again_says_the_same(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert_array_equal(read_goniometer(tmp_path / "again.csv").M10, scan.M10)
+
+
+def test_columns_headed_by_numbers_are_said_to_be_wavelengths(tmp_path):
+    (tmp_path / "s.csv").write_text(
+        "theta_i_deg,theta_view_deg,450,650\n30,20,0.1,0.3\n,,,\n"
+    )
+    with pytest.raises(DataFileError, match="expected known columns, got '450', '650'"):
+        read_goniometer(tmp_path / "s.csv")
+    columns = {"450": "M00_450nm", "650": "M00_650nm"}
+    scan = read_goniometer(tmp_path / "s.csv", columns=columns)
+    assert_allclose(scan.wavelength, [0.45, 0.65])
+    assert_allclose(scan.M00, [0.1, 0.3])
+
+
+def test_m00_among_ratios_is_one(tmp_path):
+    (tmp_path / "s.csv").write_text(
+        "theta_i_deg,theta_view_deg,m00,m10\n30,20,1,0.2\n30,25,1,-0.1\n"
+    )
+    scan = read_goniometer(tmp_path / "s.csv")
+    assert set(scan.data_vars) == {"m10"}
+    (tmp_path / "s.csv").write_text(
+        "theta_i_deg,theta_view_deg,m00,m10\n30,20,1,0.2\n30,25,0.5,-0.1\n"
+    )
+    with pytest.raises(DataFileError, match="line 3, column m00: .* got 0.5"):
+        read_goniometer(tmp_path / "s.csv")

@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from data_io.goniometer.scan import NORMALISED, QUANTITIES, STDERR
+from data_io.goniometer.scan import QUANTITIES, STDERR
 from pbrdf.optics.published.columns import column_of, unit_of
 
 __all__ = ["ANGLES", "IGNORE", "TARGETS", "Meaning", "meaning_of", "target_of"]
@@ -38,7 +38,7 @@ _SAME_VALUE = {
     "bidirectional_reflectance_factor": "reflectance-factor",
     "brdf_cos": "brdf-cos", "brdf*cos": "brdf-cos",
 }  # fmt: skip
-VALUES = (*QUANTITIES, *STOKES, *POLARISERS, "reflectance-factor", "brdf-cos")
+VALUES = (*QUANTITIES, "m00", *STOKES, *POLARISERS, "reflectance-factor", "brdf-cos")
 TARGETS = (
     *(f"{angle}_{unit}" for angle in ANGLES for unit in ("deg", "rad")),
     "wavelength_um", "wavelength_nm", *VALUES, *(f"{name}{STDERR}" for name in VALUES),
@@ -82,7 +82,9 @@ class Meaning:
 def target_of(name: str) -> Meaning | None:
     """Return the meaning of one of `TARGETS`, as the user writes it behind the sign =."""
     if name not in TARGETS:
-        return None
+        # M00_450nm: what a column headed 450 holds
+        found = meaning_of(name)
+        return found if found is not None and found.wavelength is not None else None
     return Meaning(IGNORE) if name == IGNORE else meaning_of(name)
 
 
@@ -145,7 +147,7 @@ def _value(plain: str, bracket: str) -> Meaning | None:
         name = f"m{divided[1] or divided[2]}"
     # Case tells M10 in 1/sr from m10, which is divided by M00
     known = name if name in VALUES else _SAME_VALUE.get(re.sub(r"\s+", "_", name.lower()))
-    if known is None or (known in ("m00",) and known not in NORMALISED):
+    if known is None:
         return None
     return Meaning(known, "%" if bracket == "%" else None, stderr)
 

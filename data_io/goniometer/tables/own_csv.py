@@ -4,6 +4,8 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
 from data_io.goniometer.declarations import QUANTITY_NAMES, Declared
 from data_io.goniometer.scan import STDERR, Scan
 from data_io.goniometer.tables.angles import directions
@@ -49,6 +51,7 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
         raise DataFileError(path, problem, cure, line=table.header, column="M00")
     values, quantity = mueller_elements(columns.values)
     _require_four(path, values, table.header)
+    _drop_unity(path, values, columns.lines)
     said = _quantity(path, table.comments)
     # The notes that are written into every file need not pile up
     kept = [text for text in table.comments if text and not _noted(text)]
@@ -83,6 +86,20 @@ def _require_four(path: Path, values: Iterable[str], line: int) -> None:
     if left:
         problem = f"expected I0, I45, I90 and I135 together, got {', '.join(left)}"
         raise DataFileError(path, problem, "Give all four, or I_s and I_p.", line=line)
+
+
+def _drop_unity(path: Path, values: dict[str, np.ndarray], lines: list[int]) -> None:
+    """Take out m00, which is 1 wherever it is what it says."""
+    unity = values.pop("m00", None)
+    values.pop("m00" + STDERR, None)
+    if unity is None:
+        return
+    wrong = np.abs(unity - 1.0) > 1e-6
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        problem = f"expected M00 divided by itself, 1, got {unity[row]:.6g}"
+        cure = "In 1/sr its name is M00: --columns m00=M00."
+        raise DataFileError(path, problem, cure, line=lines[row], column="m00")
 
 
 def _noted(text: str) -> bool:

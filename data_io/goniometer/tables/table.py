@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from data_io.text.text import Line, is_comment, is_number
+from data_io.text.text import Line, is_comment, is_number, without_comments
 from pbrdf.errors import DataFileError
 
 __all__ = ["RawTable", "read_table"]
@@ -84,7 +84,8 @@ def read_table(path: Path, lines: Sequence[Line]) -> RawTable:
     DataFileError
         If there are no names or no rows, or a row has cells too few or too many.
     """
-    content = [line for line in lines if line.text.strip() and not is_comment(line)]
+    # Spreadsheets leave rows of separators
+    content = [line for line in without_comments(lines) if line.text.strip(",;\t ")]
     comments = [line.text.strip().lstrip("#% ") for line in lines if is_comment(line)]
     top = next((k for k, line in enumerate(content) if _is_row(line)), len(content))
     if top == 0:

@@ -50,7 +50,8 @@ def read_blocks(path: Path, text: str) -> list[Block]:
         With all unknown columns at once, or the first cell that is no number.
     """
     lines = [Line(k, s.strip()) for k, s in enumerate(text.split("\n"), start=1)]
-    lines = [line for line in lines if line.text]
+    # Spreadsheets leave rows of separators
+    lines = [line for line in lines if line.text.strip(",;\t ")]
     content = [line for line in lines if not line.text.startswith(_COMMENT)]
     comments = [line for line in lines if line.text.startswith(_COMMENT)]
     if not content:
