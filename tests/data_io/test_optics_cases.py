@@ -310,5 +310,5 @@ def test_m00_among_ratios_is_one(tmp_path):
     (tmp_path / "s.csv").write_text(
         "theta_i_deg,theta_view_deg,m00,m10\n30,20,1,0.2\n30,25,0.5,-0.1\n"
     )
-    with pytest.raises(DataFileError, match="line 3, column m00: .* got 0.5"):
+    with pytest.raises(DataFileError, match=r"line 3, column m00: .* got 0\.5"):
         read_goniometer(tmp_path / "s.csv")
