@@ -7,6 +7,10 @@ from data_io.goniometer import (
     view_angle,
     write_goniometer,
 )
+from data_io.mending.bands import Bands, find_bands
+from data_io.mending.mend import Mend, MendedMap, MendWarning
+from data_io.mending.mend import mend as mend_map
+from data_io.mending.terraces import Deterraced, deterrace
 from data_io.micrograph.read import (
     EdgeProfile,
     MicrographWarning,
@@ -19,11 +23,11 @@ from data_io.reflectance.model import read_model, write_model
 from data_io.reflectance.results import read_result, write_result
 from data_io.text.files import NotAMapError
 from data_io.text.units import MissingUnitWarning
-from data_io.topography.bands import Bands, find_bands
 from data_io.topography.channels import ChannelWarning
 from data_io.topography.height_map import read_height_map
+from data_io.topography.mesh_map import OverhangWarning
+from data_io.topography.plausible import ScaleWarning
 from data_io.topography.profile import Profile, holds_profile, read_profile, write_profile
-from data_io.topography.terraces import Deterraced, deterrace
 
 __all__ = [
     "Bands",
@@ -31,15 +35,21 @@ __all__ = [
     "ConventionWarning",
     "Deterraced",
     "EdgeProfile",
+    "Mend",
+    "MendWarning",
+    "MendedMap",
     "MicrographWarning",
     "MissingUnitWarning",
     "NotAMapError",
+    "OverhangWarning",
     "Profile",
+    "ScaleWarning",
     "deterrace",
     "export_mitsuba",
     "find_bands",
     "holds_profile",
     "in_plane",
+    "mend_map",
     "read_goniometer",
     "read_height_map",
     "read_model",

@@ -45,6 +45,12 @@ def read_texts(path: str | Path) -> list[str]:
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
+def is_text(path: str | Path) -> bool:
+    """Tell whether a file holds text."""
+    text = _decode(read_bytes(path))
+    return text is not None and not _CONTROL.search(text)
+
+
 def _decode(content: bytes) -> str | None:
     """Return the characters of a file, or None for binary data."""
     # What is no UTF-8 is the code page of Windows, or another of one byte a sign

@@ -166,7 +166,7 @@ def _chosen_block(
     if wanted is not None:
         if not 1 <= wanted <= len(long):
             problem = f"expected a block of data from 1 to {len(long)}, got {wanted}"
-            raise DataFileError(path, problem, "Choose another by block= (--block).")
+            raise DataFileError(path, problem, "Choose another by block=.")
         return long[wanted - 1]
     pages = [b for b in blocks if texts[b[0] - 2] == texts[longest[0] - 2]]
     joined = _one_table(texts, pages) if len(pages) > 1 else None
@@ -177,7 +177,7 @@ def _chosen_block(
     places = ", ".join(f"lines {b[0]} to {b[-1]}" for b in long[:6])
     more = f" and {len(long) - 6} more" if len(long) > 6 else ""
     problem = f"expected one block of data, found {len(long)}: {places}{more}"
-    raise DataFileError(path, problem, "Choose one by block= (--block 1).")
+    raise DataFileError(path, problem, "Choose one by block=1.")
 
 
 def _one_table(texts: list[str], blocks: list[list[int]]) -> list[int] | None:

@@ -47,9 +47,9 @@ def choose_channel(path: Path, channels: list[Any], wanted: int | str | None) ->
     if len(candidates) > 1 or not heights:
         msg = (
             f"{path.name}: channel {_label(chosen)} is taken, of {_listed(candidates)}. "
-            "Another is had by channel= (--channel)."
+            "Another is had by channel=."
         )
-        warnings.warn(msg, ChannelWarning, stacklevel=5)
+        warnings.warn(msg, ChannelWarning, stacklevel=6)
     return chosen
 
 

@@ -46,7 +46,7 @@ _OUTSIDE = r"(?![^\[(]*[\])])"
 _NO_HEIGHTS = re.compile(
     r"\b(slopes?|gradients?|steigung|neigung|intensity|[uµμnm]rad|arcsec)\b", re.IGNORECASE
 )
-ASK = "Say which columns hold position and height by columns= (--columns 1,2)."
+ASK = "Say which columns hold position and height by columns='1,2'."
 
 
 @dataclass(frozen=True)
@@ -247,7 +247,7 @@ def profile_columns(
         said = next((m for h in header if (m := _NO_HEIGHTS.search(h.text))), None)
         if said and not unit_given:
             problem = f"expected columns with names, the header speaks of {said[0]!r} only"
-            cure = "Head the columns, or say what they are: --columns 1,2 --units mm,urad."
+            cure = "Head the columns, or say: columns='1,2' unit=('mm', 'urad')."
             raise DataFileError(path, problem, cure, line=line)
         plain = [Column(i, "", "", None) for i in range(width)]
         if width == 1:
@@ -256,7 +256,7 @@ def profile_columns(
             return ProfileColumns(plain[0], plain[1])
         problem = f"expected two columns, x and z, got {width} without names"
         cure = (
-            "Head them x and z, or name them by --columns; commas separate columns, "
+            "Head them x and z, or name them by columns=; commas separate columns, "
             "not decimals."
         )
         raise DataFileError(path, problem, cure, line=data.numbers[0])
@@ -287,7 +287,7 @@ def _named(path: str | Path, columns: list[Column], line: int | None) -> Profile
             named = ", ".join(f"{c.name!r} ({c.place + 1})" for c in found)
             problem = f"expected one column {axis}, found {len(found)}: {named}"
             raise DataFileError(
-                path, problem, "Choose by --columns, or remove the others.",
+                path, problem, "Choose by columns=, or remove the others.",
                 line=line, column=axis,
             )  # fmt: skip
     if not values:
@@ -314,7 +314,7 @@ def _check_units(path: str | Path, chosen: ProfileColumns, line: int | None) -> 
         angles = column is chosen.value and column.role != "z" and column.kind == "angle"
         if column.unit and column.kind != kind and not angles:
             problem = f"expected {words}, got {column.unit!r}"
-            cure = "Convert the column and head it with its unit, or choose by --columns."
+            cure = "Convert the column and head it with its unit, or choose by columns=."
             raise DataFileError(path, problem, cure, line=line, column=column.name)
 
 
@@ -384,7 +384,7 @@ def column_sizes(
         missing = missing[1:]
     if any(missing) and not all(missing):
         problem = f"expected a unit for both columns, the header names {pair[0] or pair[1]}"
-        cure = "Head the columns, for example x_mm,z_um, or give unit= (--units mm,um)."
+        cure = "Head the columns, for example x_mm,z_um, or give unit=('mm', 'um')."
         raise DataFileError(path, problem, cure, line=line)
     if all(missing):
         warn_missing_unit(path, stacklevel=5)
@@ -423,7 +423,7 @@ def _check_kinds(
     angle = unit_kind(pair[1] or "") == "angle"
     if is_slope and not angle:
         problem = f"expected slopes in a unit of angle, got {pair[1] or 'none'}"
-        cure = "Head the column, for example slope_urad, or give --units mm,urad."
+        cure = "Head the column, for example slope_urad, or give unit=('mm', 'urad')."
         raise DataFileError(path, problem, cure, line=line, column=value.name)
     if value.role == "z" and angle:
         problem = f"expected heights in a length unit, got {pair[1]!r}"

@@ -1,15 +1,25 @@
 """Height maps: NumPy arrays, text matrices, x, y, z lists, x3p, and instrument formats."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from data_io.text.files import read_bytes
-from data_io.text.units import unit_factor
+from data_io.mending.mend import mend as mend_map
+from data_io.text.files import NotAMapError, read_bytes
+from data_io.text.units import unit_factor, warn_missing_unit
 from data_io.topography.columns import Columns
+from data_io.topography.height_picture import PICTURES, read_height_picture
 from data_io.topography.height_text import Spacing, build_map, known_steps, read_text_map
-from data_io.topography.instruments import read_instrument_map
-from data_io.topography.x3p import read_x3p_map
+from data_io.topography.instruments import is_park_tiff, read_instrument_map
+from data_io.topography.measurement_standard import (
+    is_measurement_standard,
+    read_measurement_standard,
+)
+from data_io.topography.mesh_map import MESHES, read_mesh_map
+from data_io.topography.plausible import check_scale
+from data_io.topography.sdf import is_text_sdf, read_text_sdf
+from data_io.topography.x3p import is_x3p, read_x3p_map
 from pbrdf.errors import DataFileError
 from pbrdf.files import read_array
 from pbrdf.surface.heightmap import HeightMap
@@ -26,6 +36,8 @@ def read_height_map(
     channel: int | str | None = None,
     columns: Columns | None = None,
     block: int | None = None,
+    um_per_level: float | None = None,
+    mend: str | Sequence[str] = "all",
 ) -> HeightMap:
     r"""Read a height map and turn it into micrometres, axes (x, y).
 
@@ -37,8 +49,9 @@ def read_height_map(
     ----------
     path : str or Path
         A ``.npy`` array; a text matrix; a text list with columns x, y, z on a regular grid;
-        an ``.x3p`` file; or an instrument's own format (SUR, OPD, PLUX, AL3D, VK, Gwyddion,
-        AFM and others, with the extra ``pbrdf[formats]``).
+        an ``.x3p`` file; text SDF; a mesh (STL, PLY, OBJ); a picture of heights; or an
+        instrument's own format (SUR, OPD, PLUX, AL3D, VK, Gwyddion, AFM and others, with
+        the extra ``pbrdf[formats]``).
     spacing : float or (float, float), optional
         Grid steps dx, dy, only for a file that names none. [um]
     unit : str, optional
@@ -51,11 +64,18 @@ def read_height_map(
         Numbers, from 1, or names of the columns x, y, z of a text list.
     block : int, optional
         Which of several blocks of data in a text file, from 1.
+    um_per_level : float, optional
+        Of a picture whose grey levels are heights (16-bit PNG, 32-bit TIFF): the height of
+        one level. [um]
+    mend : str or sequence of str
+        Which faults to mend: ``all``, ``none``, or some of sentinels, lines, offsets,
+        spikes, terraces; see `data_io.mend_map`. All that are found are named.
 
     Returns
     -------
     HeightMap
-        Not periodic; NaN where nothing was measured.
+        Not periodic; NaN where nothing was measured. A `data_io.MendedMap` if faults were
+        found.
 
     Raises
     ------
@@ -66,6 +86,12 @@ def read_height_map(
     -----
     ChannelWarning
         If an instrument's file has several channels of lengths; it names the one taken.
+    MendWarning
+        For every kind of fault in the heights.
+    OverhangWarning
+        If a mesh hangs over itself.
+    ScaleWarning
+        If field or slopes can hardly be those of a surface.
 
     Examples
     --------
@@ -79,18 +105,68 @@ def read_height_map(
            [0.  , 0.  ]])
     """
     path = Path(path)
+    found = _read_any(
+        path, spacing, unit, channel=channel, columns=columns, block=block,
+        um_per_level=um_per_level,
+    )  # fmt: skip
+    check_scale(path, found, stated=True)
+    return mend_map(found, kinds=mend, name=path.name)
+
+
+def _read_any(
+    path: Path,
+    spacing: Spacing | None,
+    unit: str | None,
+    *,
+    channel: int | str | None,
+    columns: Columns | None,
+    block: int | None,
+    um_per_level: float | None,
+) -> HeightMap:
+    """Read a map of any format, as it is."""
     content_start = read_bytes(path)[:8]
+    suffix = path.suffix.lower()
+    if um_per_level is not None:
+        return _read_picture(path, spacing, unit, um_per_level)
     if content_start.startswith(_NPY_MAGIC):
         return _read_npy(path, spacing, unit)
-    if path.suffix.lower() == ".x3p":
+    if suffix == ".x3p" or is_x3p(path):
         _refuse_arguments(path, spacing, unit)
         return read_x3p_map(path)
-    if path.suffix.lower() in _TEXT_SUFFIXES and channel is None:
+    if is_text_sdf(path):
+        _refuse_arguments(path, spacing, unit)
+        return read_text_sdf(path)
+    if is_measurement_standard(path):
+        raise NotAMapError(path, read_measurement_standard(path)[0].size)
+    if suffix in MESHES:
+        return _read_mesh(path, spacing, unit)
+    if suffix in PICTURES and not is_park_tiff(path):
+        problem = "expected the height of a grey level, a picture has none"
+        cure = "Give um_per_level= and spacing=, in um."
+        raise DataFileError(path, problem, cure)
+    if suffix in _TEXT_SUFFIXES and channel is None:
         return _read_any_text(path, spacing, unit, columns, block)
-    if path.suffix.lower() == ".npy":
+    if suffix == ".npy":
         problem = "expected a NumPy array, the file does not start like one"
         raise DataFileError(path, problem, "Write it with numpy.save.")
     return read_instrument_map(path, spacing=spacing, unit=unit, channel=channel)
+
+
+def _read_picture(
+    path: Path, spacing: Spacing | None, unit: str | None, um_per_level: float
+) -> HeightMap:
+    if unit is not None:
+        problem = "expected no unit argument, um_per_level gives the size of a level"
+        raise DataFileError(path, problem, "Leave the argument out.")
+    rows = read_height_picture(path, um_per_level)
+    return build_map(path, rows, known_steps(path, spacing))
+
+
+def _read_mesh(path: Path, spacing: Spacing | None, unit: str | None) -> HeightMap:
+    if unit is None:
+        warn_missing_unit(path, stacklevel=5)
+    steps = None if spacing is None else known_steps(path, spacing)
+    return read_mesh_map(path, unit_factor(unit or "um"), steps)
 
 
 def _refuse_arguments(path: Path, spacing: Spacing | None, unit: str | None) -> None:

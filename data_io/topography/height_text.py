@@ -73,7 +73,7 @@ def read_text_map(
     try:
         found = _axes(named)
     except ValueError as error:
-        cure = "Choose by columns= (--columns 1,2,4)."
+        cure = "Choose by columns='1,2,4'."
         raise DataFileError(path, str(error), cure, line=header[-1].number) from None
     if found is not None:
         return _read_list(path, header, data, found, spacing, unit)
@@ -130,7 +130,7 @@ def _read_list(
     columns = read_numbers(path, data, names, gaps=True, columns=places)
     units = _list_units(path, header, axes)
     if not units and unit is None:
-        warn_missing_unit(path, stacklevel=6)
+        warn_missing_unit(path, stacklevel=7)
     if len(units) not in (0, 1, 3):
         problem = f"expected a unit for each of x, y, z, got {units}"
         cure = "Write x_um,y_um,z_um or another unit of each."
@@ -151,7 +151,7 @@ def _read_list(
     node = j * nx + i
     if nx * ny > 20 * len(lines) + 1000:
         problem = f"expected points on a grid, {len(lines)} points span {nx} x {ny} nodes"
-        cure = "If the columns are no x, y, z, name them by columns= (--columns)."
+        cure = "If the columns are no x, y, z, name them by columns=."
         raise DataFileError(path, problem, cure)
     order = np.argsort(node, kind="stable")
     repeats = np.flatnonzero(np.diff(node[order]) == 0)
@@ -171,7 +171,7 @@ def _list_units(path: Path, header: list[Line], axes: list[Column]) -> list[str]
     for column in axes:
         if column.unit and column.kind != "length":
             problem = f"expected a length unit, got {column.unit!r}"
-            cure = "Convert the column, or choose others by columns= (--columns 1,2,4)."
+            cure = "Convert the column, or choose others by columns='1,2,4'."
             raise DataFileError(
                 path, problem, cure, line=header[-1].number, column=column.name
             )

@@ -15,6 +15,7 @@ import numpy as np
 from data_io.text.files import NotAMapError
 from data_io.text.units import LENGTH_UNITS, normalise_unit, unit_factor
 from data_io.topography.channels import choose_channel
+from data_io.topography.plausible import ScaleWarning, check_scale
 from data_io.topography.sur import plain_sur
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
@@ -36,6 +37,8 @@ INSTRUMENT_SUFFIXES = {
 
 
 _NO_HEIGHT = 1e30
+_NANO_PER_MILLI = 1e-6
+_PARK_TAG = 50432
 
 
 def read_instrument_map(
@@ -64,7 +67,8 @@ def read_instrument_map(
         If SurfaceTopography is not installed or cannot read the file, or if the file holds
         a profile or lacks grid steps or unit.
     """
-    topography, factor = _read(Path(path), spacing, unit, channel)
+    path = Path(path)
+    topography, factor, stated = _read(path, spacing, unit, channel)
     if topography.dim != 2 or min(topography.nb_grid_pts) < 2:
         raise NotAMapError(path, int(np.prod(topography.nb_grid_pts)))
     size_x, size_y = topography.physical_sizes
@@ -74,12 +78,38 @@ def read_instrument_map(
     if not np.isfinite(heights).any():
         problem = "expected heights, every point is marked missing"
         raise DataFileError(path, problem, "Export the map again.")
-    return HeightMap(heights, (size_x / nx * factor, size_y / ny * factor))
+    found = HeightMap(heights, (size_x / nx * factor, size_y / ny * factor))
+    if spacing is not None and not stated:
+        return _other_spacing(path, found, spacing)
+    try:
+        return check_scale(path, found, stated=stated)
+    except DataFileError:
+        if path.suffix.lower() != ".nms":
+            raise
+    # The package takes the pitch of NanoFocus for millimetres; newer files have nanometres
+    dx, dy = (step * _NANO_PER_MILLI for step in found.spacing)
+    nearer = check_scale(path, HeightMap(heights, (dx, dy)), stated=False)
+    msg = (
+        f"{path.name}: the pitch in its header, {1e3 * dx:g}, is taken as nanometres: "
+        f"a pixel of {dx:g} um, not of {dx / _NANO_PER_MILLI:g} um."
+    )
+    warnings.warn(msg, ScaleWarning, stacklevel=4)
+    return nearer
+
+
+def _other_spacing(path: Path, found: HeightMap, spacing: Any) -> HeightMap:
+    """Return a map with the steps of the caller, if those of the file cannot be right."""
+    try:
+        check_scale(path, found, stated=False)
+    except DataFileError:
+        return HeightMap(found.heights, spacing)
+    problem = "expected no spacing argument, the file names its own"
+    raise DataFileError(path, problem, "Leave the argument out.")
 
 
 def read_instrument_profile(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Read positions and heights of a profile in an instrument's format. [um]"""
-    topography, factor = _read(Path(path), None, None, None)
+    topography, factor, _ = _read(Path(path), None, None, None)
     if topography.dim == 1:
         x, z = topography.positions_and_heights()
         return np.asarray(x) * factor, _filled(z) * factor
@@ -103,8 +133,8 @@ def _read(
     spacing: float | tuple[float, float] | None,
     unit: str | None,
     channel: int | str | None,
-) -> tuple[Any, float]:
-    """Return the wanted channel of a file, and the size of its unit. [um]"""
+) -> tuple[Any, float, bool]:
+    """Return the wanted channel of a file, its unit [um], and whether steps were given."""
     reader = _open(path)
     with _faults(path):
         channels = [c for c in reader.channels if c.dim in (1, 2)]
@@ -112,19 +142,36 @@ def _read(
     # The reader of another format may take a file for its own
     if np.prod(chosen.nb_grid_pts, dtype=float) > 1000 * path.stat().st_size:
         raise _unreadable(path, ValueError(f"{chosen.nb_grid_pts} points in a small file"))
+    missing = chosen.unit is None and unit is None
+    bare = chosen.physical_sizes is None and spacing is None
+    if missing or bare:
+        wanted = " and ".join([*["a length unit"] * missing, *["steps"] * bare])
+        problem = f"expected {wanted}, the file names none"
+        raise DataFileError(path, problem, "Give unit= and spacing= in um.")
     factor = _factor(path, chosen.unit, unit)
     sizes = None
-    if spacing is not None:
-        if chosen.physical_sizes is not None:
-            problem = "expected no spacing argument, the file names its own"
-            raise DataFileError(path, problem, "Leave the argument out.")
-        steps = np.broadcast_to(spacing, (chosen.dim,)) / factor
+    stated = spacing is not None and chosen.physical_sizes is None
+    if stated:
+        steps = np.broadcast_to(np.asarray(spacing), (chosen.dim,)) / factor
         sizes = tuple(float(n * d) for n, d in zip(chosen.nb_grid_pts, steps, strict=True))
-    elif chosen.physical_sizes is None:
-        problem = "expected a grid spacing, the file names none"
-        raise DataFileError(path, problem, "Give spacing= in um.")
     with _faults(path):
-        return reader.topography(channel_index=chosen.index, physical_sizes=sizes), factor
+        found = reader.topography(channel_index=chosen.index, physical_sizes=sizes)
+    return found, factor, stated
+
+
+def is_park_tiff(path: Path) -> bool:
+    """Tell whether a TIFF file is of a Park microscope, its heights in private tags."""
+    if path.suffix.lower() not in (".tif", ".tiff"):
+        return False
+    import tifffile
+
+    try:
+        with tifffile.TiffFile(path) as content:
+            tags = getattr(content.pages[0], "tags", ())
+            return any(tag.code == _PARK_TAG for tag in tags)
+    # Parsers of damaged pictures fail in every way there is
+    except Exception:
+        return False
 
 
 def _open(path: Path) -> Any:

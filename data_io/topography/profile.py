@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from data_io.text.files import ZIP_MAGIC, read_bytes
+from data_io.text.files import is_text
 from data_io.text.text import Line, read_numbers, split_header
 from data_io.topography.columns import (
     Columns,
@@ -18,7 +18,11 @@ from data_io.topography.columns import (
 )
 from data_io.topography.header_fields import profile_step
 from data_io.topography.instruments import INSTRUMENT_SUFFIXES, read_instrument_profile
-from data_io.topography.x3p import read_x3p
+from data_io.topography.measurement_standard import (
+    is_measurement_standard,
+    read_measurement_standard,
+)
+from data_io.topography.x3p import is_x3p, read_x3p
 from pbrdf.errors import DataFileError, real_array, require
 from pbrdf.files import complete_file
 
@@ -201,10 +205,13 @@ def read_profile(
     ...     read_profile(path)
     Profile(3 points, length 1 um, evenly spaced)
     """
-    suffix = Path(path).suffix.lower()
-    if read_bytes(path)[:4] == ZIP_MAGIC and suffix not in INSTRUMENT_SUFFIXES:
+    path = Path(path)
+    if is_x3p(path):
         return _read_x3p_profile(path)
-    if suffix in INSTRUMENT_SUFFIXES:
+    if is_measurement_standard(path):
+        return build_profile(path, *read_measurement_standard(path))
+    asked = not all(given is None for given in (unit, columns, spacing, block))
+    if path.suffix.lower() in INSTRUMENT_SUFFIXES or (not asked and not is_text(path)):
         x, z = read_instrument_profile(path)
         return build_profile(path, x[np.isfinite(z)], z[np.isfinite(z)])
     return read_text_profile(path, unit, columns, spacing, block)
@@ -303,10 +310,7 @@ def _step(path: str | Path, header: list[Line], spacing: float | None) -> float:
     step = found if spacing is None else spacing
     if step is None:
         problem = "expected positions or the distance of points, the file names none"
-        cure = (
-            "Give spacing= in um (--spacing-um), or in the file the line "
-            "'# spacing_um = ...'."
-        )
+        cure = "Give spacing= in um, or in the file the line '# spacing_um = ...'."
         raise DataFileError(path, problem, cure)
     if found is not None and spacing is not None and not np.isclose(found, spacing):
         problem = f"expected the spacing given, {spacing} um, the header says {found} um"

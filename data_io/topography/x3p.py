@@ -155,6 +155,19 @@ def _member(path: Path, archive: zipfile.ZipFile, name: str, most: int) -> bytes
         return stream.read(info.file_size)
 
 
+def is_x3p(path: Path) -> bool:
+    """Tell whether a file is an archive with main.xml, whatever its name."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+    except (zipfile.BadZipFile, OSError):
+        return False
+    # The archives of other instruments have a main file of that name, and an index
+    return any(PurePosixPath(name).name == "main.xml" for name in names) and not any(
+        PurePosixPath(name).name == "index.xml" for name in names
+    )
+
+
 def read_x3p_map(path: str | Path) -> HeightMap:
     """Read an areal x3p file. [um]"""
     content = read_x3p(path)

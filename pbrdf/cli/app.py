@@ -108,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     talk(Talk.NORMAL)
     with warnings.catch_warnings(), _ending_in_order():
-        warnings.showwarning = _one_line_warning
+        warnings.showwarning = partial(_one_line_warning, arguments)
         try:
             code = app(
                 args=arguments or ["--help"], prog_name="pbrdf", standalone_mode=False
@@ -192,6 +192,9 @@ def _usage(error: typer.TyperException, arguments: Sequence[str]) -> str:
     return f"{sentence} See `pbrdf {f'{name} ' if name else ''}--help`."
 
 
-def _one_line_warning(message: Warning | str, *_: object, **__: object) -> None:
+def _one_line_warning(
+    arguments: Sequence[str], message: Warning | str, *_: object, **__: object
+) -> None:
     if talk() is not Talk.QUIET:
-        typer.echo(f"warning: {' '.join(str(message).split())}", err=True)
+        text = _in_words_of_the_command(" ".join(str(message).split()), arguments)
+        typer.echo(f"warning: {text}", err=True)

@@ -23,6 +23,7 @@ __all__ = [
     "Kind",
     "KindOption",
     "MaterialFile",
+    "MendOption",
     "OptionalIndex",
     "Output",
     "Rays",
@@ -33,6 +34,7 @@ __all__ = [
     "SourceHalfAngle",
     "Spacing",
     "Surface",
+    "UmPerLevel",
     "UmPerPixel",
     "Unit",
     "Wavelength",
@@ -107,6 +109,20 @@ ColumnsOption = Annotated[
         "--columns",
         help="Columns of a table by number from 1, or name: position and height (2,3), or "
         "x, y and z (1,2,4).",
+    ),
+]
+UmPerLevel = Annotated[
+    float | None,
+    typer.Option(
+        min=1e-9, max=1e6, help="Height of a grey level, of a picture of heights [um]."
+    ),
+]
+MendOption = Annotated[
+    str,
+    typer.Option(
+        "--mend",
+        help="Faults of a map to mend: all, none, or some of sentinels, lines, offsets, "
+        "spikes, terraces.",
     ),
 ]
 Block = Annotated[

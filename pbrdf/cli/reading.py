@@ -31,6 +31,8 @@ def read_surface(
     channel: str | None = None,
     columns: str | None = None,
     block: int | None = None,
+    um_per_level: float | None = None,
+    mend: str = "all",
     picture: Mapping[str, Any] = _NOTHING,
 ) -> "Profile | HeightMap":
     """Read a surface file as what it is, or as what the user says it is.
@@ -46,7 +48,12 @@ def read_surface(
     import data_io
 
     guessed = kind is Kind.auto
-    kind = _kind(path, columns, block) if guessed else kind
+    if um_per_level is not None and guessed:
+        kind = Kind.map
+    kind = _kind(path, columns, block) if kind is Kind.auto else kind
+    if um_per_level is not None and kind is Kind.map:
+        # A pixel of a picture is a step of its map
+        spacing, um_per_pixel = spacing or um_per_pixel, None
     given = {name: value for name, value in picture.items() if value is not None}
     unused = {
         "--um-per-pixel": um_per_pixel is not None and kind is not Kind.image,
@@ -54,6 +61,7 @@ def read_surface(
         "--unit": unit is not None and kind is Kind.image,
         "--columns": columns is not None and kind is Kind.image,
         "--block": block is not None and kind is Kind.image,
+        "--um-per-level": um_per_level is not None and kind is not Kind.map,
         "--channel": channel is not None and kind is not Kind.map,
     } | {f"--{name.replace('_', '-')}": kind is not Kind.image for name in given}
     for option, wrong in unused.items():
@@ -64,7 +72,8 @@ def read_surface(
         if um_per_pixel is None and "scale_bar_um" not in given:
             msg = (
                 f"{path.name} is a picture and has no scale. Give --um-per-pixel, "
-                "or the length of its scale bar (pbrdf statistics --scale-bar-um)."
+                "or the length of its scale bar (pbrdf statistics --scale-bar-um); for a "
+                "picture whose levels are heights also --um-per-level."
             )
             raise ValueError(msg)
         return data_io.read_profile_image(path, um_per_pixel, **given)
@@ -74,8 +83,9 @@ def read_surface(
         )
     try:
         return data_io.read_height_map(
-            path, spacing=spacing, unit=unit, channel=channel, columns=columns, block=block
-        )
+            path, spacing=spacing, unit=unit, channel=channel, columns=columns, block=block,
+            um_per_level=um_per_level, mend=mend,
+        )  # fmt: skip
     except data_io.NotAMapError:
         if not guessed:
             raise
@@ -153,7 +163,9 @@ def _kind(path: Path, columns: str | None, block: int | None) -> Kind:
     """Tell the kind from the name, and that of a text file from its columns."""
     suffix = path.suffix.lower()
     if suffix in _IMAGES:
-        return Kind.image
+        from data_io.topography.instruments import is_park_tiff
+
+        return Kind.map if is_park_tiff(path) else Kind.image
     if suffix not in _TEXT or suffix == ".xyz":
         return Kind.map
     from data_io import holds_profile

@@ -235,9 +235,9 @@ def test_a_file_without_lengths_is_refused(tmp_path):
 def test_step_and_unit_are_given_where_the_file_names_none(tmp_path):
     path = tmp_path / "map.npz"
     np.savez(path, heights=ROWS.T)
-    with pytest.raises(DataFileError, match=r"unit, the file names none\. Give unit="):
+    with pytest.raises(DataFileError, match=r"unit and steps, .* Give unit="):
         read_height_map(path)
-    with pytest.raises(DataFileError, match=r"grid spacing, the file names none"):
+    with pytest.raises(DataFileError, match=r"expected steps, the file names none"):
         read_height_map(path, unit="nm")
     surface = read_height_map(path, unit="nm", spacing=(DX, DY))
     assert_allclose(surface.spacing, (DX, DY), rtol=1e-12)

@@ -4,9 +4,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
-from data_io import holds_profile, read_height_map, read_profile
+from data_io import (
+    MendedMap,
+    MendWarning,
+    MissingUnitWarning,
+    OverhangWarning,
+    ScaleWarning,
+    holds_profile,
+    read_height_map,
+    read_profile,
+)
+from fitting import surface_statistics
 from pbrdf.cli.app import main
 from pbrdf.errors import DataFileError
 
@@ -56,7 +66,7 @@ def test_slopes_are_read_as_slopes_and_never_as_heights(name):
 
 def test_a_column_without_unit_is_asked_for():
     path = CASES / "microns_first_only.csv"
-    with pytest.raises(DataFileError, match=r"unit for both columns.*--units mm,um"):
+    with pytest.raises(DataFileError, match=r"unit for both columns.*unit="):
         read_profile(path)
     assert read_profile(path, unit="um").size == POINTS
 
@@ -98,20 +108,23 @@ def test_columns_are_found_by_name_and_unit(tmp_path, text):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("x [mm]  intensity [a.u.]\n" + rows("{x} {z}"), "heights or slopes.*--columns"),
-        ("time [s],z [um]\n" + rows("{x},{z}"), "a column of positions.*--columns"),
+        ("x [mm]  intensity [a.u.]\n" + rows("{x} {z}"), "heights or slopes.*columns="),
+        ("time [s],z [um]\n" + rows("{x},{z}"), "a column of positions.*columns="),
         ("x [mm]  height [V]\n" + rows("{x} {z}"), r"height \[V\].*length unit, got 'V'"),
         ("x [mm]  slope [um]\n" + rows("{x} {z}"), "a unit of angle.*got 'um'"),
         ("x [mm]  height [urad]\n" + rows("{x} {z}"), "length unit, got 'urad'"),
-        ("# slope along the axis\n" + rows("{x} {z}"), "speaks of 'slope' only.*--units"),
-        ("x_um,height_um,residual height_um\n" + rows("{x},{z},{z}"), r"\(2\).*\(3\).*--c"),
+        ("# slope along the axis\n" + rows("{x} {z}"), "speaks of 'slope' only.*unit="),
+        (
+            "x_um,height_um,residual height_um\n" + rows("{x},{z},{z}"),
+            r"\(2\).*\(3\).*columns=",
+        ),
         ("x [um/mm]  z [um]\n" + rows("{x} {z}"), "length unit, got 'um/mm'"),
-        ("foo,bar\n" + rows("{x},{z}"), "names 'foo', 'bar'.*--columns"),
+        ("foo,bar\n" + rows("{x},{z}"), "names 'foo', 'bar'.*columns="),
         (
             f"a\n{rows('{x} {z}')}\nb\n{rows('{x} {z}')}\n",
-            "found 2: lines 2 to 5, lines 7 to 10.*--block",
+            "found 2: lines 2 to 5, lines 7 to 10.*block=",
         ),
-        ("z_um\n" + rows("{z}"), "distance of points.*--spacing-um"),
+        ("z_um\n" + rows("{z}"), "distance of points.*spacing="),
     ],
 )
 def test_what_is_no_height_is_refused_with_the_option_that_mends_it(
@@ -164,7 +177,7 @@ def test_lists_of_maps_have_further_columns_too(tmp_path):
     assert_allclose(surface.heights, np.arange(4)[:, None] - 10 * np.arange(3))
     # A number of the row, a position and a height make no grid
     table = "n um,x um,z um\n" + "\n".join(f"{i},{i / 2},{i % 7}" for i in range(200))
-    with pytest.raises(DataFileError, match=r"200 points span 200 x 200 nodes.*--columns"):
+    with pytest.raises(DataFileError, match=r"200 points span 200 x 200 nodes.*columns="):
         read_height_map(write(tmp_path, table), columns="1,2,3")
 
 
@@ -177,3 +190,118 @@ def test_the_command_line_takes_columns_units_and_blocks(tmp_path, capsys):
     assert "height_rms  0.7" in capsys.readouterr().out
     assert main(["statistics", str(path), "--kind", "profile", "--units", "mm,nm,um"]) == 2
     assert "--units" in capsys.readouterr().err
+
+
+def heights_of(path, **options):
+    return read_height_map(path, **options).heights
+
+
+def test_instruments_meshes_pictures_and_arrays_hold_one_map():
+    wanted = np.load(CASES / "inf.npy").T
+    hidden = np.isinf(wanted)
+    assert hidden.any()
+    options = {"spacing": 0.5, "unit": "um"}
+    for name in ("height.h5", "height.mat"):
+        found = heights_of(CASES / name, **options)
+        # These have the first axis x
+        assert_allclose(found.T[~hidden], wanted[~hidden], atol=1e-6)
+        with pytest.raises(DataFileError, match=r"unit and steps, .*unit= and spacing="):
+            read_height_map(CASES / name)
+    for name in ("height32.tif", "height32.tiff"):
+        found = heights_of(CASES / name, um_per_level=1.0, spacing=0.5)
+        assert_allclose(found[~hidden], wanted[~hidden], atol=1e-6)
+        with pytest.raises(DataFileError, match="um_per_level="):
+            read_height_map(CASES / name)
+    for name in ("inf.npy", "inf.csv"):
+        found = read_height_map(CASES / name, **({"spacing": 0.5} if "npy" in name else {}))
+        assert found.spacing == (0.5, 0.5)
+        assert_array_equal(np.isnan(found.heights), hidden)
+        slopes = np.concatenate([s[np.isfinite(s)].ravel() for s in found.slopes()])
+        assert_allclose(np.sqrt(np.mean(slopes**2)), 0.2, rtol=0.01)
+
+
+@pytest.mark.parametrize("name", ["surf.stl", "surf.ply", "surf.obj"])
+def test_meshes_on_a_grid_keep_it(name):
+    surface = read_height_map(CASES / name, unit="um")
+    assert_allclose(surface.spacing, (0.5, 0.5), rtol=1e-6)
+    lines = (CASES / "surf.obj").read_text().splitlines()
+    z = [float(line.split()[3]) for line in lines if line.startswith("v ")]
+    assert_allclose(surface.heights, np.reshape(z, (60, 60)), atol=1e-6)
+    with pytest.warns(MissingUnitWarning):
+        read_height_map(CASES / name)
+
+
+def test_an_overhang_is_counted_and_the_map_is_its_top(tmp_path):
+    step = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [4, 4, 0]], dtype=float)
+    roof = np.array([[1, 1, 2], [3, 1, 2], [1, 3, 2], [3, 3, 2]], dtype=float)
+    points = np.concatenate([step, roof])
+    faces = [[0, 1, 2], [1, 3, 2], [4, 5, 6], [5, 7, 6]]
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in points)
+    text += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces)
+    with pytest.warns(OverhangWarning, match="hangs over at 9 of 25 nodes"):
+        surface = read_height_map(write(tmp_path, text, "roof.obj"), unit="um", spacing=1.0)
+    wanted = np.zeros((5, 5))
+    wanted[1:4, 1:4] = 2
+    assert_allclose(surface.heights, wanted)
+
+
+def test_the_pitch_of_a_confocal_microscope_is_nanometres():
+    with pytest.warns(ScaleWarning, match=r"312.5, is taken as nanometres.* 312500 um"):
+        surface = read_height_map(CASES / "tiny.nms")
+    assert surface.spacing == (0.3125, 0.3125)
+    assert surface.missing == 0
+
+
+def test_text_of_iso_25178_is_in_metres():
+    surface = read_height_map(CASES / "sdf_like.sdf")
+    assert_allclose(surface.spacing, (0.5, 0.5))
+    assert surface.shape == (40, 40)
+    assert round(surface.missing * 1600) == 44
+    assert_allclose(surface.heights[1, 0], -1.203)
+
+
+def test_measurement_standards(tmp_path):
+    for name in ("profile_like.smd", "wa.prf"):
+        with pytest.raises(DataFileError, match="expected 400 heights as CZ says, got 160"):
+            read_profile(CASES / name)
+        text = (
+            (CASES / name).read_text().replace("4.0E+02", "1.6E+02").replace("400", "160")
+        )
+        profile = read_profile(write(tmp_path, text, name))
+        assert_allclose(profile.x[:3], [0, 1e3, 2e3])
+        assert_allclose(profile.z[:2], [-1.221515, -1.201878], atol=1e-3)
+
+
+def test_a_field_of_metres_is_refused_with_both_readings(tmp_path):
+    # A SUR or HGT file would do as well; this one is a map whose steps are metres
+    path = write(tmp_path, "# spacing_um = 2.5e6\n" + "0,1,0\n1,0,2\n0,1,1\n" * 22)
+    with pytest.warns(ScaleWarning, match=r"got 165 m with a pixel of 2.5 m; .*165 um"):
+        read_height_map(path)
+
+
+def test_sentinels_are_missing_by_default_and_left_by_choice():
+    with pytest.warns(MendWarning, match="16 of 25600 heights are 0, far from the rest"):
+        surface = read_height_map(CASES / "zeros.npy", spacing=0.5)
+    assert isinstance(surface, MendedMap)
+    assert surface.mends[0].kind == "sentinels"
+    assert surface.mends[0].where.sum() == 16 == round(surface.missing * 25600)
+    assert_allclose(surface_statistics(surface).slope_rms.value, 0.2, rtol=0.05)
+    with pytest.warns(MendWarning, match="left as they are; mend='sentinels'"):
+        left = read_height_map(CASES / "zeros.npy", spacing=0.5, mend="none")
+    assert left.missing == 0
+    assert left.heights.min() == 0
+
+
+@pytest.mark.filterwarnings("always::data_io.MendWarning")
+def test_the_command_line_reads_pictures_of_heights_and_leaves_faults(tmp_path, capsys):
+    picture = str(CASES / "height32.tif")
+    options = ["--um-per-level", "1", "--spacing-um", "0.5"]
+    assert main(["statistics", picture, *options]) == 0
+    assert "slope_rms  0.198" in capsys.readouterr().out
+    assert main(["statistics", picture]) == 2
+    assert "--um-per-level" in capsys.readouterr().err
+    zeros = str(CASES / "zeros.npy")
+    assert main(["statistics", zeros, "--spacing-um", "0.5", "--mend", "none"]) == 0
+    assert "--mend 'sentinels' mends" in capsys.readouterr().err
+    assert main(["statistics", str(CASES / "height.mat")]) == 2
+    assert "--unit" in capsys.readouterr().err

@@ -30,6 +30,8 @@ def command(
     channel: options.Channel = None,
     columns: options.ColumnsOption = None,
     block: options.Block = None,
+    um_per_level: options.UmPerLevel = None,
+    mend: options.MendOption = "all",
     form: options.FormOption = "tilt",
     wavelength: options.Wavelength = None,
     scan_columns: declaring.PipelineScanColumns = None,
@@ -76,7 +78,8 @@ def command(
         stage = stack.enter_context(staged_folder(target, force=force))
         heights = read_surface(
             surface, kind=kind, um_per_pixel=um_per_pixel, spacing=spacing, unit=unit,
-            channel=channel, columns=columns, block=block,
+            channel=channel, columns=columns, block=block, um_per_level=um_per_level,
+            mend=mend,
         )  # fmt: skip
         measurement = read_scan(scan, wavelength=wavelength, declared=declared)
         reading = perf_counter() - begin

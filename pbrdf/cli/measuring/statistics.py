@@ -34,6 +34,8 @@ def command(
     channel: options.Channel = None,
     columns: options.ColumnsOption = None,
     block: options.Block = None,
+    um_per_level: options.UmPerLevel = None,
+    mend: options.MendOption = "all",
     form: options.FormOption = "tilt",
     figure: Annotated[
         Path | None,
@@ -82,7 +84,8 @@ def command(
     }
     heights = read_surface(
         surface, kind=kind, um_per_pixel=um_per_pixel, spacing=spacing, unit=unit,
-        channel=channel, columns=columns, block=block, picture=picture,
+        channel=channel, columns=columns, block=block, um_per_level=um_per_level,
+        mend=mend, picture=picture,
     )  # fmt: skip
     if overlay is not None:
         _draw_overlay(overlay, surface, heights, force=force)

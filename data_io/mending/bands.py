@@ -52,14 +52,17 @@ class Bands:
 
 
 def equal_neighbours(heights: Array) -> float:
-    """Share of pairs of neighbouring heights that are equal."""
-    equal = pairs = 0
+    """Share of pairs of neighbouring heights that are equal, along the axis of fewer.
+
+    Grooves are equal along one axis without being bands.
+    """
+    shares = []
     for axis in range(heights.ndim):
         difference = np.diff(heights, axis=axis)
         known = np.isfinite(difference)
-        pairs += int(known.sum())
-        equal += int((np.abs(difference[known]) <= _tolerance(heights)).sum())
-    return equal / max(pairs, 1)
+        equal = np.abs(difference[known]) <= _tolerance(heights)
+        shares.append(float(equal.mean()) if equal.size else 0.0)
+    return min(shares)
 
 
 def _tolerance(heights: Array) -> float:

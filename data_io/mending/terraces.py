@@ -2,7 +2,7 @@ r"""De-terracing: the surface under a map that was digitised to bands.
 
 Each height h is known to lie, but for noise, within its band. The surface is a Gaussian
 field with the autocorrelation that the increments of the map imply
-(`data_io.topography.roughness_prior`), and noise is white. Two draws alternate (Gibbs):
+(`data_io.mending.roughness_prior`), and noise is white. Two draws alternate (Gibbs):
 of the heights with noise, u given h, each from a normal cut off at its band; and of the
 surface, h given u, by the Wiener filter
 
@@ -22,8 +22,8 @@ import scipy.fft
 from scipy import special
 from scipy.sparse import linalg
 
-from data_io.topography.bands import Bands, find_bands
-from data_io.topography.roughness_prior import fit_prior
+from data_io.mending.bands import Bands, find_bands
+from data_io.mending.roughness_prior import fit_prior
 from pbrdf.surface.heightmap import HeightMap
 
 Array = np.ndarray
@@ -31,8 +31,8 @@ Array = np.ndarray
 # Draws to reach the surface, and as many again to know its scatter; a large map knows its
 # autocorrelation so well that it starts nearer
 _DRAWS = 30
-_DRAWS_LARGE = 16
-_LARGE = 500_000
+_DRAWS_LARGE = 8
+_LARGE = 300_000
 # Heights drawn with less noise than this share of a band move too slowly between draws
 _LEAST_NOISE = 0.12
 
@@ -130,7 +130,7 @@ def deterrace(
             rng, field[observed], np.sqrt(noise), limits[0][observed], limits[1][observed]
         )
         # What lies in a hole follows its rim too slowly from draw to draw
-        if i in (0, 2 * draws - 1) and not known.all():
+        if i == 0 and not known.all():
             noisy = _in_holes(noisy, observed, spectrum, noise, rng)
         field = _surface_given(noisy, spectrum, noise, rng)
         noise = max(float(np.mean((noisy - field)[observed] ** 2)), least)
@@ -152,7 +152,7 @@ def _torus(shape: tuple[int, ...], longest: float, *, periodic: bool) -> tuple[i
     """Return the size of a periodic grid whose far side does not feel the near one."""
     if periodic:
         return shape[0], shape[1]
-    margins = [int(min(max(2.5 * longest, 8), n)) for n in shape]
+    margins = [int(min(max(2.5 * longest, 8), n / 3 + 8)) for n in shape]
     sizes = [
         scipy.fft.next_fast_len(n + m, real=True)
         for n, m in zip(shape, margins, strict=True)
@@ -198,7 +198,7 @@ def _in_holes(
 
     count = int(hidden.sum())
     system = linalg.LinearOperator((count, count), matvec=left, dtype=float)
-    mean, _ = linalg.cg(system, filtered(full)[hidden], rtol=1e-4, maxiter=80)
+    mean, _ = linalg.cg(system, filtered(full)[hidden], rtol=1e-3, maxiter=30)
     drawn = noisy.copy()
     drawn[hidden] = free[hidden] + mean
     return drawn

@@ -1,0 +1,1 @@
+"""Faults of measured maps: what is found, counted, named, and mended by a stated rule."""

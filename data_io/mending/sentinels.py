@@ -1,0 +1,137 @@
+"""Numbers that stand for missing data, and single points that jumped.
+
+A sentinel is a value far from all other heights (-9999, 0 where heights are 50), or a
+patch of one value whose rim jumps as no other neighbours do. A spike is one point that
+leaves the plane of its neighbours by twelve times what is usual.
+"""
+
+import numpy as np
+from scipy import ndimage
+
+Array = np.ndarray
+
+# Beyond the rest by this many times the rest's own reach
+_FAR = 5.0
+# Jumps at the rim of a patch over those between other neighbours
+_JUMP = 5.0
+_SMALLEST_PATCH = 6
+_SPIKE = 12.0
+# More spikes than this share are the texture itself
+_MOST_SPIKES = 0.005
+_TO_RMS = 1.4826
+
+
+def find_sentinels(heights: Array) -> tuple[Array, list[float]]:
+    """Find heights that stand for missing data.
+
+    Parameters
+    ----------
+    heights : ndarray
+        Of a map or a profile; NaN is missing already. [um]
+
+    Returns
+    -------
+    ndarray of bool, list of float
+        Where they are, and the values. [um]
+
+    Examples
+    --------
+    >>> z = np.append(np.sin(np.arange(30.0)), -9999.0)
+    >>> find_sentinels(z)[1]
+    [-9999.0]
+    """
+    missing = np.isnan(heights)
+    found: list[float] = []
+    while len(found) < 4:
+        value = _far_value(heights[~missing])
+        if value is None and heights.ndim == 2:
+            value = _patch_value(heights, missing)
+        if value is None:
+            break
+        missing = missing | (heights == value)
+        found.append(value)
+    return missing & ~np.isnan(heights), found
+
+
+def _far_value(known: Array) -> float | None:
+    """Return the lowest or highest value, if it is far from all the rest."""
+    if known.size < 12:
+        return None
+    for value in (float(known.min()), float(known.max())):
+        rest = known[known != value]
+        if rest.size < known.size / 2:
+            continue
+        # Of the rest nearly all: a second sentinel may be among it
+        low, middle, high = np.quantile(rest, [0.005, 0.5, 0.995])
+        reach = max(high - middle, middle - low)
+        gap = np.abs(rest - value).min()
+        if abs(value - middle) > _FAR * reach and gap > reach > 0:
+            return value
+    return None
+
+
+def _patch_value(heights: Array, missing: Array) -> float | None:
+    """Return the value of a flat patch with a rim of jumps, on a map that is not flat."""
+    known = heights[~missing]
+    values, counts = np.unique(known, return_counts=True)
+    if values.size < known.size / 4:
+        return None
+    value = float(values[np.argmax(counts)])
+    patch = (heights == value) & ~missing
+    labels, n = ndimage.label(patch)
+    if n == 0 or np.bincount(labels.ravel())[1:].max() < _SMALLEST_PATCH:
+        return None
+    inside, rim = [], []
+    for axis in (0, 1):
+        jumps = np.abs(np.diff(heights, axis=axis))
+        ends = np.diff(patch.astype(int), axis=axis) != 0
+        both = ~patch[1:] & ~patch[:-1] if axis == 0 else ~patch[:, 1:] & ~patch[:, :-1]
+        inside.append(jumps[both & np.isfinite(jumps)])
+        rim.append(jumps[ends & np.isfinite(jumps)])
+    usual = float(np.median(np.concatenate(inside)))
+    if usual > 0 and np.median(np.concatenate(rim)) > _JUMP * usual:
+        return value
+    return None
+
+
+def find_spikes(heights: Array) -> Array:
+    """Find single points of a map that jumped.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (nx, ny)
+        NaN where missing. [um]
+
+    Returns
+    -------
+    ndarray of bool
+    """
+    filled = heights.copy()
+    missing = np.isnan(heights)
+    if missing.all() or min(heights.shape) < 5:
+        return np.zeros(heights.shape, dtype=bool)
+    if missing.any():
+        nearest = ndimage.distance_transform_edt(
+            missing, return_distances=False, return_indices=True
+        )
+        filled = filled[tuple(nearest)]
+    found = np.zeros(heights.shape, dtype=bool)
+    cross = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]]) / 4
+    ring = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], dtype=bool)
+    for _ in range(3):
+        away = filled - ndimage.convolve(filled, cross, mode="nearest")
+        usual = _TO_RMS * float(np.median(np.abs(away[~missing])))
+        if usual == 0:
+            break
+        far = (np.abs(away) > _SPIKE * usual) & ~missing & ~found
+        if not far.any():
+            break
+        around = ndimage.median_filter(filled, footprint=ring, mode="nearest")
+        most = ndimage.maximum_filter(np.abs(away), size=3)
+        alone = (np.abs(away) == most) & (np.abs(filled - around) > 0.6 * np.abs(away))
+        new = far & alone
+        if not new.any():
+            break
+        found |= new
+        filled = np.where(new, around, filled)
+    return found if found.mean() <= _MOST_SPIKES else np.zeros_like(found)

@@ -1,0 +1,103 @@
+"""Whether a map can be what an instrument measured: its field, pixel and slope."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from pbrdf.errors import DataFileError
+from pbrdf.surface.heightmap import HeightMap
+
+
+class ScaleWarning(UserWarning):
+    """Lengths of a file that can hardly be what was measured."""
+
+
+# The widest field of an instrument, and steps below which there is nothing to measure. [um]
+_WIDEST = 1e6
+_FINEST = 1e-5
+# Slopes of neighbours, in the middle of their distribution
+_STEEPEST = 30.0
+_FLATTEST = 1e-9
+# Readers take a unit for another a thousand or a million times as large
+_FACTORS = (1e-3, 1e-6, 1e-9, 1e3, 1e6, 1e9)
+
+
+def check_scale(path: str | Path, surface: HeightMap, *, stated: bool) -> HeightMap:
+    """Return a map whose field, pixel and slope are plausible.
+
+    Parameters
+    ----------
+    path : str or Path
+        For the message.
+    surface : HeightMap
+        As its reader gave it. [um]
+    stated : bool
+        Whether the caller gave the scale; then it is warned of, not refused.
+
+    Raises
+    ------
+    DataFileError
+        If the field exceeds a metre, the pixel is below an atom, or the slopes are those of
+        no surface, with the reading that would be plausible.
+
+    Warns
+    -----
+    ScaleWarning
+        The same, for a scale that the caller gave.
+    """
+    fault = _fault(surface)
+    if fault is None:
+        return surface
+    problem, cure = fault
+    if not stated:
+        raise DataFileError(path, problem, cure)
+    warnings.warn(f"{Path(path).name}: {problem}. {cure}", ScaleWarning, stacklevel=4)
+    return surface
+
+
+def _fault(surface: HeightMap) -> tuple[str, str] | None:
+    """Return what is implausible and how to mend it."""
+    pixel = max(surface.spacing)
+    field = max(n * d for n, d in zip(surface.shape, surface.spacing, strict=True))
+    if field > _WIDEST or pixel < _FINEST:
+        other = next(
+            (f for f in _FACTORS if field * f < _WIDEST / 10 and pixel * f > 1e-3), None
+        )
+        problem = (
+            f"expected the field of an instrument, got {_length(field)} with a pixel of "
+            f"{_length(pixel)}"
+        )
+        if other is not None:
+            problem += (
+                f"; in another unit it would be {_length(field * other)} with a pixel of "
+                f"{_length(pixel * other)}"
+            )
+        return problem, "Say which by spacing= in um."
+    slope = typical_slope(surface)
+    if slope > _STEEPEST or 0 < slope < _FLATTEST:
+        known = surface.heights[np.isfinite(surface.heights)]
+        problem = (
+            f"expected slopes of a surface, got {slope:.3g} in the middle, of a height "
+            f"range of {_length(float(np.ptp(known)))} over pixels of {_length(pixel)}"
+        )
+        return problem, "Check the units of height and pixel (unit=, spacing=)."
+    return None
+
+
+def typical_slope(surface: HeightMap) -> float:
+    """Median of the slopes of neighbours that differ. [1]"""
+    # Heights near the largest number there is
+    with np.errstate(over="ignore", invalid="ignore"):
+        parts = [np.abs(part[np.isfinite(part)]).ravel() for part in surface.slopes()]
+    slopes = np.concatenate(parts)
+    slopes = slopes[slopes > 0]
+    return float(np.median(slopes)) if slopes.size else 0.0
+
+
+def _length(value: float) -> str:
+    """Return a length in a unit that reads well."""
+    for size, unit in ((1e6, "m"), (1e3, "mm"), (1.0, "um"), (1e-3, "nm")):
+        if value >= size:
+            return f"{value / size:.4g} {unit}"
+    return f"{value / 1e-3:.3g} nm"
