@@ -8,8 +8,8 @@ from data_io.goniometer import (
     write_goniometer,
 )
 from data_io.mending.bands import Bands, find_bands
-from data_io.mending.mend import Mend, MendedMap, MendWarning
-from data_io.mending.mend import mend as mend_map
+from data_io.mending.faults import Mend, MendedMap, MendWarning
+from data_io.mending.faults import mend as mend_map
 from data_io.mending.terraces import Deterraced, deterrace
 from data_io.micrograph.read import (
     EdgeProfile,

@@ -6,7 +6,7 @@ from pathlib import Path
 from pbrdf.errors import DataFileError
 from pbrdf.files import read_bounded
 
-ZIP_MAGIC = b"PK\x03\x04"
+TEXT_SUFFIXES = {".csv", ".txt", ".asc", ".dat", ".tsv", ".xyz"}
 
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 # The micro sign of other code pages: DOS, Shift-JIS, GB 2312, UTF-8 decoded twice

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io.mending.mend import mend as mend_map
-from data_io.text.files import NotAMapError, read_bytes
+from data_io.mending.faults import mend as mend_map
+from data_io.text.files import TEXT_SUFFIXES, NotAMapError, read_bytes
 from data_io.text.units import unit_factor, warn_missing_unit
 from data_io.topography.columns import Columns
 from data_io.topography.height_picture import PICTURES, read_height_picture
@@ -25,7 +25,6 @@ from pbrdf.files import read_array
 from pbrdf.surface.heightmap import HeightMap
 
 _NPY_MAGIC = b"\x93NUMPY"
-_TEXT_SUFFIXES = {".csv", ".txt", ".asc", ".dat", ".tsv", ".xyz"}
 
 
 def read_height_map(
@@ -144,7 +143,7 @@ def _read_any(
         problem = "expected the height of a grey level, a picture has none"
         cure = "Give um_per_level= and spacing=, in um."
         raise DataFileError(path, problem, cure)
-    if suffix in _TEXT_SUFFIXES and channel is None:
+    if suffix in TEXT_SUFFIXES and channel is None:
         return _read_any_text(path, spacing, unit, columns, block)
     if suffix == ".npy":
         problem = "expected a NumPy array, the file does not start like one"

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from data_io.text.files import is_text
+from data_io.text.files import TEXT_SUFFIXES, is_text
 from data_io.text.text import Line, read_numbers, split_header
 from data_io.topography.columns import (
     Columns,
@@ -210,8 +210,8 @@ def read_profile(
         return _read_x3p_profile(path)
     if is_measurement_standard(path):
         return build_profile(path, *read_measurement_standard(path))
-    asked = not all(given is None for given in (unit, columns, spacing, block))
-    if path.suffix.lower() in INSTRUMENT_SUFFIXES or (not asked and not is_text(path)):
+    suffix = path.suffix.lower()
+    if suffix in INSTRUMENT_SUFFIXES or not (suffix in TEXT_SUFFIXES or is_text(path)):
         x, z = read_instrument_profile(path)
         return build_profile(path, x[np.isfinite(z)], z[np.isfinite(z)])
     return read_text_profile(path, unit, columns, spacing, block)

@@ -121,6 +121,7 @@ def test_a_list_without_unit_is_micrometres_and_says_so(tmp_path):
     assert caught[0].filename == __file__
 
 
+@pytest.mark.filterwarnings("ignore::data_io.ScaleWarning", "ignore::data_io.MendWarning")
 @given(
     rows=arrays(
         np.float32,
@@ -239,6 +240,8 @@ def test_a_bad_file_is_refused(tmp_path, name, content, options, message):
 
 
 @pytest.mark.parametrize(("name", "missing"), [("EC1_1", 13216), ("NiTE_on_Steel_1", 7352)])
+# Digitised from pictures: tests of mending have its figures
+@pytest.mark.filterwarnings("ignore::data_io.MendWarning")
 def test_measured_interferometer_maps(shared, name, missing):
     path = shared / "data" / "topography" / f"{name}.npy"
     surface = read_height_map(path, spacing=0.2268, mend="none")
