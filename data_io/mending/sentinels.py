@@ -15,6 +15,7 @@ _FAR = 5.0
 # Jumps at the rim of a patch over those between other neighbours
 _JUMP = 5.0
 _SMALLEST_PATCH = 6
+_FEWEST_VALUES = 40
 _SPIKE = 12.0
 # More spikes than this share are the texture itself
 _MOST_SPIKES = 0.005
@@ -74,7 +75,7 @@ def _patch_value(heights: Array, missing: Array) -> float | None:
     """Return the value of a flat patch with a rim of jumps, on a map that is not flat."""
     known = heights[~missing]
     values, counts = np.unique(known, return_counts=True)
-    if values.size < known.size / 4:
+    if values.size < max(known.size / 4, _FEWEST_VALUES):
         return None
     value = float(values[np.argmax(counts)])
     patch = (heights == value) & ~missing
@@ -88,8 +89,11 @@ def _patch_value(heights: Array, missing: Array) -> float | None:
         both = ~patch[1:] & ~patch[:-1] if axis == 0 else ~patch[:, 1:] & ~patch[:, :-1]
         inside.append(jumps[both & np.isfinite(jumps)])
         rim.append(jumps[ends & np.isfinite(jumps)])
-    usual = float(np.median(np.concatenate(inside)))
-    if usual > 0 and np.median(np.concatenate(rim)) > _JUMP * usual:
+    others, edges = np.concatenate(inside), np.concatenate(rim)
+    if others.size == 0 or edges.size == 0:
+        return None
+    usual = float(np.median(others))
+    if usual > 0 and np.median(edges) > _JUMP * usual:
         return value
     return None
 
