@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from pbrdf.scene.read import load_scene
     from pbrdf.scene.scene import Scene
     from pbrdf.simulation.run import simulate
-    from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
+    from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, MeshSurface
+    from pbrdf.surface.mesh import morphologies
     from pbrdf.wave import WaveModel
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "HeightMap",
     "Material",
     "MeasuredSurface",
+    "MeshSurface",
     "MicrofacetModel",
     "Scene",
     "Spheres",
@@ -38,6 +40,7 @@ __all__ = [
     "compare_dew",
     "load_scene",
     "materials",
+    "morphologies",
     "observe",
     "simulate",
 ]
@@ -51,6 +54,7 @@ _HOME = {
     "HeightMap": "pbrdf.surface",
     "Material": "pbrdf.optics.materials",
     "MeasuredSurface": "pbrdf.surface",
+    "MeshSurface": "pbrdf.surface",
     "MicrofacetModel": "pbrdf.analytic",
     "Scene": "pbrdf.scene.scene",
     "Spheres": "pbrdf.contaminants",
@@ -61,10 +65,15 @@ _HOME = {
     "simulate": "pbrdf.simulation.run",
 }
 
+_MODULES = {
+    "materials": "pbrdf.materials",
+    "morphologies": "pbrdf.surface.mesh.morphologies",
+}
+
 
 def __getattr__(name: str) -> Any:
-    if name == "materials":
-        return import_module("pbrdf.materials")
+    if name in _MODULES:
+        return import_module(_MODULES[name])
     if name not in _HOME:
         msg = f"module {__name__!r} has no attribute {name!r}"
         raise AttributeError(msg)

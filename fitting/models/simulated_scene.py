@@ -8,7 +8,7 @@ import numpy as np
 
 from fitting.models.index_grid import IndexGrid, Range
 from fitting.models.simulated_trace import Trace, trace
-from pbrdf import HeightMap, Material, MicrofacetModel, Scene
+from pbrdf import HeightMap, Material, MeshSurface, MicrofacetModel, Scene
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,6 +70,8 @@ def opaque_material(scene: Scene) -> Material:
     reason = ""
     if len(scene.materials) > 1:
         reason = "several materials"
+    elif isinstance(scene.surface, MeshSurface):
+        reason = "a mesh"
     elif scene.contaminants:
         reason = "contaminants"
     elif material.diffuse_albedo > 0.0:
@@ -86,6 +88,7 @@ def opaque_material(scene: Scene) -> Material:
 def facet_slope(scene: Scene) -> float | tuple[float, float]:
     """Return the rms slope of the facets, one number where the surface is isotropic."""
     surface = scene.surface
+    assert not isinstance(surface, MeshSurface)  # refused by `opaque_material`
     if isinstance(surface, HeightMap):
         x, y = (float(np.sqrt(np.mean(slope**2))) for slope in surface.slopes())
     else:

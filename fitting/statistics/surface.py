@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol, TypeGuard
+from typing import Protocol, TypeGuard, overload
 
 import numpy as np
 
@@ -25,7 +25,9 @@ from fitting.statistics.form import (
     remove_form_map,
     remove_form_profile,
 )
+from fitting.statistics.mesh import MeshStatistics, mesh_statistics
 from fitting.statistics.result import SurfaceStatistics
+from pbrdf import MeshSurface
 from pbrdf.errors import real_array
 
 Array = np.ndarray
@@ -51,19 +53,34 @@ class MapLike(Protocol):
     def spacing(self) -> tuple[float, float]: ...  # noqa: D102
 
 
+@overload
+def surface_statistics(
+    surface: MeshSurface, *, form: str | int = ..., quantisation: float | None = ...
+) -> MeshStatistics: ...
+
+
+@overload
 def surface_statistics(
     surface: ProfileLike | MapLike,
     *,
+    form: str | int = ...,
+    quantisation: float | None = ...,
+) -> SurfaceStatistics: ...
+
+
+def surface_statistics(
+    surface: ProfileLike | MapLike | MeshSurface,
+    *,
     form: str | int = "tilt",
     quantisation: float | None = None,
-) -> SurfaceStatistics:
+) -> SurfaceStatistics | MeshStatistics:
     """Height, length, slope and noise of a measured surface, each with its uncertainty.
 
     Parameters
     ----------
-    surface : Profile or HeightMap
+    surface : Profile, HeightMap or MeshSurface
         Profile with x, z, evenly spaced or not; or map with heights (nx, ny), NaN where
-        missing, and spacing. [um]
+        missing, and spacing [um]; or a mesh, of which the facets are told as they are.
     form : str or int
         What to remove first: ``none``, ``mean``, ``tilt``, ``curvature`` or the degree of a
         polynomial. What it takes from the roughness is made good.
@@ -74,7 +91,7 @@ def surface_statistics(
 
     Returns
     -------
-    SurfaceStatistics
+    SurfaceStatistics, or MeshStatistics of a mesh
 
     Raises
     ------
@@ -109,14 +126,17 @@ def surface_statistics(
     >>> found.corr_length.low < 15 < found.corr_length.high
     True
     """
+    if isinstance(surface, MeshSurface):
+        return mesh_statistics(surface)
     degree = form_degree(form)
     if _is_map(surface):
         return _map_statistics(surface, degree, _form_name(degree), quantisation)
     if _is_profile(surface):
         return _profile_statistics(surface, degree, _form_name(degree), quantisation)
     msg = (
-        f"surface must be a Profile (x, z) or a HeightMap (heights, spacing), "
-        f"got {type(surface).__name__}. See data_io.read_profile and read_height_map."
+        f"surface must be a Profile (x, z), a HeightMap (heights, spacing) or a "
+        f"MeshSurface, got {type(surface).__name__}. See "
+        "data_io.read_profile and read_height_map."
     )
     raise TypeError(msg)
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numba
 
-__all__ = ["cache_folder", "jit", "kernel_sources"]
+__all__ = ["cache_folder", "compiled_callback", "jit", "kernel_sources"]
 
 
 def kernel_sources() -> list[Path]:
@@ -74,11 +74,25 @@ def jit(
     settings: Any = {"nogil": True, "cache": _KEPT, "error_model": "numpy"} | options
     if not allocates:
         settings["_nrt"] = False
-    # Numba reads its cache folder when a function is decorated, and only there
+    return _keeping(lambda: numba.njit(**settings)(function))
+
+
+def compiled_callback(function: Callable[..., Any], signature: Any) -> Any:
+    """Compile a function for a C library to call, at the attribute `address`."""
+    return _keeping(
+        lambda: numba.cfunc(signature, cache=_KEPT, error_model="numpy")(function)
+    )
+
+
+def _keeping(compiled: Callable[[], Any]) -> Any:
+    """Let Numba keep what it compiles in the folder of the kernels.
+
+    It reads the name of the folder when a function is decorated, and only there.
+    """
     config: Any = numba.config
     previous = config.CACHE_DIR
     config.CACHE_DIR = str(_FOLDER)
     try:
-        return numba.njit(**settings)(function)
+        return compiled()
     finally:
         config.CACHE_DIR = previous

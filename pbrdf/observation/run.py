@@ -21,7 +21,7 @@ from pbrdf.observation.one_sample import look_at
 from pbrdf.observation.readings import Readings, as_scan, to_dataset
 from pbrdf.scene.scene import Scene
 from pbrdf.scene.write import scene_text
-from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
+from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, MeshSurface
 from pbrdf.tracer import arguments
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.schedule import gather
@@ -163,6 +163,12 @@ def observe(  # noqa: PLR0913  (the public signature)
         msg = f"theta_i, theta_s, dphi must be one-dimensional, got shape {shape}."
         raise ValueError(msg)
     surface, fixed = scene.surface, isinstance(scene.surface, HeightMap)
+    if isinstance(surface, MeshSurface):
+        msg = (
+            "scene must stand on heights to be observed, got a MeshSurface. Use simulate "
+            "with source_half_angle and bins as wide as the detector."
+        )
+        raise TypeError(msg)
     root = arguments.seed_sequence(seed)
     rays = arguments.count("n_rays", n_rays, arguments.BATCHES)
     drawn = arguments.count("realizations", realizations, 1)

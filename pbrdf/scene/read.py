@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pbrdf.errors import DataFileError
 from pbrdf.files import companion, read_array, read_toml
 from pbrdf.optics.materials import Material
@@ -17,11 +19,12 @@ from pbrdf.scene.toml_tables import (
     read_material,
     required,
 )
-from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, Surface
+from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, MeshSurface, Surface
 
 _SURFACE_KEYS = {
     "gaussian": {"shape", "spacing_um", "corr_length_um", "slope_rms", "height_rms_um"},
     "height_map": {"file", "heights_um", "spacing_um", "periodic", "labels"},
+    "mesh": {"file", "vertices_um", "faces", "period_um", "labels", "unit"},
     "flat": {"size_um"},
     "measured": {
         "shape", "spacing_um", "corr_length_um", "height_rms_um",
@@ -64,6 +67,8 @@ def _read_surface(table: dict[str, Any], source: Path) -> Surface:
     check_keys(table, _SURFACE_KEYS[kind], "surface", source)
     if kind == "flat":
         return HeightMap.flat(size=_pair(table.get("size_um", 1.0)))
+    if kind == "mesh":
+        return _read_mesh(table, source)
     if kind == "gaussian":
         check_present(table, ("shape", "spacing_um", "corr_length_um"), "surface", source)
         return GaussianSurface(
@@ -109,6 +114,26 @@ def _read_surface(table: dict[str, Any], source: Path) -> Surface:
         periodic=bool(table.get("periodic", False)),
         labels=table.get("labels"),
     )
+
+
+def _read_mesh(table: dict[str, Any], source: Path) -> MeshSurface:
+    if ("file" in table) == ("vertices_um" in table):
+        raise DataFileError(
+            source,
+            "[surface]: a mesh comes from 'file', or 'vertices_um' and 'faces'",
+            "Give exactly one.",
+        )
+    _check_type(table, "file", str, "Name a mesh file.", source)
+    _check_type(table, "unit", str, 'Name a unit, such as "um".', source)
+    labels = table.get("labels")
+    period = _pair(table["period_um"]) if "period_um" in table else None
+    if "file" in table:
+        return MeshSurface(
+            source.parent / table["file"], period, labels, unit=table.get("unit")
+        )
+    check_present(table, ("faces",), "surface", source)
+    arrays = np.asarray(table["vertices_um"]), np.asarray(table["faces"])
+    return MeshSurface(arrays, period, labels, unit=table.get("unit"))
 
 
 def _read_substrate(table: dict[str, Any], source: Path) -> Material | list[Material]:

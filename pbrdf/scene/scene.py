@@ -9,7 +9,7 @@ from pbrdf.contaminants import Drops, Film, Spheres
 from pbrdf.optics import library
 from pbrdf.optics.materials import Material
 from pbrdf.scene.write import write_scene
-from pbrdf.surface import HeightMap, Surface
+from pbrdf.surface import FixedSurface, MeshSurface, Surface
 
 Contamination = Drops | Spheres | Film
 
@@ -20,11 +20,11 @@ class Scene:
 
     Parameters
     ----------
-    surface : HeightMap, GaussianSurface or MeasuredSurface
+    surface : HeightMap, MeshSurface, GaussianSurface or MeasuredSurface
         A fixed surface, or an ensemble of which realisations are drawn.
     substrate : Material or str, or a sequence of them
         Material under the surface, or its name in the library; several where the labels of
-        a HeightMap number them.
+        a HeightMap or MeshSurface number them.
     contaminants : Drops, Spheres or Film, or a sequence of them
         What lies on the surface; where two overlap, the first rules. One Film at most.
 
@@ -55,8 +55,9 @@ class Scene:
     ) -> None:
         if not isinstance(surface, Surface):
             msg = (
-                f"surface must be a HeightMap, GaussianSurface or MeasuredSurface, got "
-                f"{type(surface).__name__}. Wrap an array of heights [um] in HeightMap."
+                "surface must be a HeightMap, MeshSurface, GaussianSurface or "
+                f"MeasuredSurface, got {type(surface).__name__}. Wrap an array of "
+                "heights [um] in HeightMap."
             )
             raise TypeError(msg)
         several = not isinstance(substrate, str | Material)
@@ -65,7 +66,15 @@ class Scene:
         _check_labels(surface, materials)
         object.__setattr__(self, "surface", surface)
         object.__setattr__(self, "substrate", materials if several else materials[0])
-        object.__setattr__(self, "contaminants", _checked(contaminants))
+        lying = _checked(contaminants)
+        if lying and isinstance(surface, MeshSurface):
+            msg = (
+                f"contaminants must be left out on a MeshSurface, got {len(lying)}, the "
+                f"first of them {type(lying[0]).__name__}. Make opaque bodies a part of "
+                "the mesh, with labels= for their material, or lay them on a HeightMap."
+            )
+            raise ValueError(msg)
+        object.__setattr__(self, "contaminants", lying)
 
     @property
     def materials(self) -> tuple[Material, ...]:
@@ -118,11 +127,12 @@ def _check_labels(surface: Surface, materials: tuple[Material, ...]) -> None:
                 f"{type(material).__name__}. Write Material(n, kappa)."
             )
             raise TypeError(msg)
-    labels = surface.labels if isinstance(surface, HeightMap) else None
+    labels = surface.labels if isinstance(surface, FixedSurface) else None
     highest = 0 if labels is None else int(labels.max())
     if highest >= len(materials) or (labels is None and len(materials) != 1):
         msg = (
             f"substrate must have one material for each label, got {len(materials)} for "
-            f"labels up to {highest}. Give a list of materials and HeightMap(..., labels=)."
+            f"labels up to {highest}. Give a list of materials, and labels= of the "
+            "HeightMap or MeshSurface."
         )
         raise ValueError(msg)

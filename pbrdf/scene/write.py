@@ -13,10 +13,12 @@ from pbrdf.files import complete_file
 from pbrdf.optics.materials import Material
 from pbrdf.scene.contaminant_tables import contaminant_table
 from pbrdf.scene.toml_tables import material_table, plain
-from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, Surface
+from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, MeshSurface, Surface
 
 # A height map up to this many nodes is written into the TOML file itself
 INLINE_NODES = 4096
+# And a mesh up to this many vertices
+INLINE_VERTICES = 1024
 
 
 class Written(Protocol):
@@ -36,6 +38,8 @@ def scene_text(scene: Written) -> str:
         return scene.to_toml()
     except ValueError:
         surface = scene.surface
+        if isinstance(surface, MeshSurface):
+            return f"# {surface!r}"
         assert isinstance(surface, HeightMap)
         return f"# {surface!r}, height rms {np.std(surface.heights):.6g} um"
 
@@ -65,6 +69,8 @@ def write_scene(
 
 
 def _surface_table(surface: Surface, target: Path | None) -> dict[str, Any]:
+    if isinstance(surface, MeshSurface):
+        return _mesh_table(surface, target)
     if isinstance(surface, GaussianSurface):
         table = {
             "type": "gaussian",
@@ -103,19 +109,50 @@ def _surface_table(surface: Surface, target: Path | None) -> dict[str, Any]:
             "Its heights are written beside the TOML file."
         )
         raise ValueError(msg)
-    return table | {"file": _write_heights(surface.heights, target).name}
+    content = io.BytesIO()
+    np.save(content, surface.heights)
+    return table | {"file": _write_beside(target, ".npy", content, surface.heights).name}
 
 
-def _write_heights(heights: np.ndarray, target: Path) -> Path:
-    """Write heights beside a scene, under a name that tells what is in them.
+def _mesh_table(surface: MeshSurface, target: Path | None) -> dict[str, Any]:
+    table: dict[str, Any] = {"type": "mesh"}
+    if surface.period is not None:
+        table["period_um"] = list(surface.period)
+    labels = surface.labels
+    if len(surface.vertices) <= INLINE_VERTICES:
+        table |= {
+            "vertices_um": surface.vertices.tolist(),
+            "faces": surface.faces.tolist(),
+        }
+        return table if labels is None else table | {"labels": labels.tolist()}
+    if target is None:
+        msg = (
+            f"path must be given for a mesh of {len(surface.faces)} faces, got None. "
+            "Its faces are written beside the TOML file."
+        )
+        raise ValueError(msg)
+    arrays = {"vertices": surface.vertices, "faces": surface.faces}
+    if labels is not None:
+        arrays["labels"] = labels
+    # Mesh formats hold float32 only
+    content = io.BytesIO()
+    np.savez(content, **arrays)  # type: ignore[arg-type]
+    return table | {"file": _write_beside(target, ".npz", content, *arrays.values()).name}
 
-    So no other file is overwritten, and a scene never finds heights that are not its own:
+
+def _write_beside(
+    target: Path, suffix: str, content: io.BytesIO, *arrays: np.ndarray
+) -> Path:
+    """Write arrays beside a scene, under a name that tells what is in them.
+
+    So no other file is overwritten, and a scene never finds arrays that are not its own:
     they are there before the scene's file is, and an earlier scene keeps its own.
     """
-    content = io.BytesIO()
-    np.save(content, heights)
-    digest = hashlib.sha256(content.getbuffer()).hexdigest()[:12]
-    file = target.with_name(f"{target.stem}-{digest}.npy")
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(repr((array.dtype.str, array.shape)).encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    file = target.with_name(f"{target.stem}-{digest.hexdigest()[:12]}{suffix}")
     if not file.exists():
         with complete_file(file) as stage:
             stage.write_bytes(content.getbuffer())

@@ -12,6 +12,7 @@ from pbrdf.kernels.paths.shading import (
     ABSORBED,
     LEAKED,
     N_ESCAPED,
+    N_EXACT,
     N_LEAKED,
     N_MISMATCH,
     N_SEGMENTS,
@@ -19,6 +20,7 @@ from pbrdf.kernels.paths.shading import (
     N_SIDE,
     N_TRUNCATED,
     SIDEWAYS,
+    TRANSMITTED,
     TRUNCATED,
 )
 from pbrdf.scene.scene import Scene
@@ -82,6 +84,7 @@ def to_dataset(
         "rays_leaked": counts[:, N_LEAKED].tolist(),
         "rays_left_sideways": counts[:, N_SIDE].tolist(),
         "self_hits": int(counts[:, N_SELF].sum()),
+        "exact_searches": int(counts[:, N_EXACT].sum()),
         "medium_mismatches": int(counts[:, N_MISMATCH].sum()),
         "rel_error": rel_error,
     }
@@ -105,7 +108,7 @@ def _estimates(moments: Moments) -> dict[str, np.ndarray]:
         "albedo_stderr": np.moveaxis(albedo_stderr, 2, 0),
         "projected_solid_angle": weight,
         "absorbed": energy[..., ABSORBED],
-        "transmitted": np.zeros(energy.shape[:2]),
+        "transmitted": energy[..., TRANSMITTED],
         "truncated": energy[..., TRUNCATED],
         "leaked": energy[..., LEAKED],
         "left_sideways": energy[..., SIDEWAYS],

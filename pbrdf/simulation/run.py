@@ -18,11 +18,10 @@ from pbrdf.scene.scene import Scene
 from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.plan import Plan, Tally
 from pbrdf.simulation.results import to_dataset
-from pbrdf.simulation.skips import chosen_skips, explanation
-from pbrdf.simulation.trace import prepare, trace_sample
-from pbrdf.surface import HeightMap
+from pbrdf.simulation.skips import chosen_skips, explanation, mesh_explanation
+from pbrdf.simulation.trace import Target, prepare, trace_sample
+from pbrdf.surface import FixedSurface, HeightMap, MeshSurface
 from pbrdf.tracer import arguments
-from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.schedule import gather
 from pbrdf.tracer.thin_films import thin_absorber_warnings
@@ -238,7 +237,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
             "source_half_angle": plan.half_angle,
             "folded": plan.fold,
             "target_rel_error": np.nan if target is None else target,
-            "intersector": "height-field walk" if "walk" in allowed else "embree",
+            "intersector": _intersector(scene, allowed),
             "explanation": _explain(scene, plan) if explain else [],
             "contaminants": [str(dict(report)) for report in moments[0].reports],
             "warnings": notes,
@@ -295,17 +294,17 @@ def _thin_films(scene: Scene, moments: Moments, waves: np.ndarray | None) -> lis
     )
 
 
-def _realize(
-    scene: Scene, plan: Plan, seed: np.random.SeedSequence
-) -> Field | EmbreeField | WetField:
+def _realize(scene: Scene, plan: Plan, seed: np.random.SeedSequence) -> Target:
     """One realisation of the scene, ready for tracing."""
     surface = scene.surface
-    if not isinstance(surface, HeightMap):
+    if not isinstance(surface, FixedSurface):
         surface = surface.sample(seed)
     target = prepare(surface, plan.skips)
     if plan.media is None:
         return target
-    assert isinstance(target, Field)  # contaminants exclude the Embree route
+    # Contaminants exclude meshes and the Embree route
+    assert isinstance(target, Field)
+    assert isinstance(surface, HeightMap)
     return WetField.of(
         target, surface, scene.contaminants, plan.media, seed,
         skips_deep="deep" in plan.skips,
@@ -320,7 +319,7 @@ def _taken(spare: deque[Tally]) -> Tally | None:
 
 
 def _trace_fixed(
-    target: Field | EmbreeField | WetField,
+    target: Target,
     plans: Sequence[Plan],
     spare: deque[Tally],
     seed: np.random.SeedSequence,
@@ -338,6 +337,14 @@ def _trace_realization(
 
 def _explain(scene: Scene, plan: Plan) -> list[str]:
     surface = scene.surface
+    if isinstance(surface, MeshSurface):
+        return mesh_explanation(plan, faces=len(surface.faces), kind=surface.kind)
     sample = surface if isinstance(surface, HeightMap) else surface.sample(0)
     steepest = float(Field.of(sample).terrain.steepest)
     return explanation(plan, periodic=sample.periodic, steepest=steepest)
+
+
+def _intersector(scene: Scene, allowed: frozenset[str]) -> str:
+    if isinstance(scene.surface, MeshSurface):
+        return "embree, refined in float64"
+    return "height-field walk" if "walk" in allowed else "embree"

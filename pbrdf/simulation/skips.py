@@ -55,6 +55,26 @@ def explanation(plan: Plan, *, periodic: bool, steepest: float) -> list[str]:
         lines = _about_the_walk(plan.skips, periodic, steepest)
     else:
         lines = ["Nothing skipped: Embree traces every ray."]
+    return lines + _about_the_plan(plan)
+
+
+def mesh_explanation(plan: Plan, *, faces: int, kind: str) -> list[str]:
+    """Say the same of a run over a mesh of so many faces, of a kind of `MeshSurface`."""
+    below = {
+        "ground": "no light passes below",
+        "bodies": "light that passes below is transmitted",
+        "sheet": "light that leaves beyond the rim is left out",
+    }[kind]
+    lines = [
+        f"Embree: one tree over {faces} faces finds facets for all angles; float64 says "
+        f"where they are met; {below}."
+    ]
+    return lines + _about_the_plan(plan)
+
+
+def _about_the_plan(plan: Plan) -> list[str]:
+    """Say which bounces, elements and wavelengths a run leaves out."""
+    lines = []
     if plan.base.shape[1] == 0 and plan.media is None:
         lines.append("Diffuse base: none, so no path is split; nothing is transmitted.")
     if plan.max_bounces < 3:

@@ -11,20 +11,34 @@ from pbrdf.kernels.bodies.transparent import trace_among_bodies
 from pbrdf.kernels.paths import shading
 from pbrdf.kernels.paths.first_bounce import N_MIRRORED, LineRoom
 from pbrdf.kernels.paths.spectra import close_sums
-from pbrdf.kernels.paths.transport import N_WAITING, sweep_batch, trace_batch
+from pbrdf.kernels.paths.transport import (
+    N_WAITING,
+    sweep_batch,
+    trace_batch,
+    trace_mesh_batch,
+)
 from pbrdf.kernels.terrain.entry import Source
 from pbrdf.kernels.terrain.horizon import NO_HORIZON
 from pbrdf.kernels.terrain.sweep import N_FIRST
 from pbrdf.simulation.plan import Plan, Tally
 from pbrdf.simulation.spectra import NOTHING
 from pbrdf.surface.heightmap import HeightMap
+from pbrdf.surface.mesh import MeshSurface
 from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
+from pbrdf.tracer.mesh_field import MeshField
 from pbrdf.tracer.wet_field import WetField
 
+# What is traced: a height map, one by way of Embree, one with what lies on it, or a mesh
+Target = Field | EmbreeField | WetField | MeshField
 
-def prepare(surface: HeightMap, skips: frozenset[str]) -> Field | EmbreeField:
+
+def prepare(
+    surface: HeightMap | MeshSurface, skips: frozenset[str]
+) -> Field | EmbreeField | MeshField:
     """Make a surface ready for tracing with the skips allowed: the walk, or else Embree."""
+    if isinstance(surface, MeshSurface):
+        return MeshField.of(surface, skips)
     field = Field.of(surface)
     terrain = field.terrain
     if "steep" not in skips:
@@ -36,7 +50,7 @@ def prepare(surface: HeightMap, skips: frozenset[str]) -> Field | EmbreeField:
 
 
 def trace_sample(
-    target: Field | EmbreeField | WetField,
+    target: Target,
     plan: Plan,
     seed: np.random.SeedSequence,
     room: Tally | None = None,
@@ -60,7 +74,7 @@ def trace_sample(
         # Drawn last, so that a narrow beam keeps its rays
         shifts = np.hstack([shifts, rng.random((len(plan.theta_i), 2))])
     for index, theta in enumerate(plan.theta_i):
-        field = target if isinstance(target, Field) else target.field
+        field = target if isinstance(target, Field | MeshField) else target.field
         launch = field.entry_rectangle(theta, plan.phi_i, plan.half_angle)
         source = Source(
             np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
@@ -71,6 +85,14 @@ def trace_sample(
             zenith, azimuth, tally.flux[index], tally.lit[index], tally.energy[index],
             tally.counts[index], np.zeros((4, 4)),
         )  # fmt: skip
+        light = tally.spectra[index] if tally.spectra else NOTHING
+        if isinstance(field, MeshField):
+            trace_mesh_batch(
+                field.facets(), source, record, waiting, light, plan.optics, bins
+            )
+            if tally.spectra:
+                close_sums(light, plan.n_stokes, bins.lit)
+            continue
         # One pass along each line of entry points finds all first facets
         walks = not isinstance(target, EmbreeField)
         sweeps = walks and field.periodic and "sweep" in plan.skips
@@ -88,13 +110,12 @@ def trace_sample(
                 plan.n_stokes, places, bins,
             )  # fmt: skip
             continue
-        light = tally.spectra[index] if tally.spectra else NOTHING
         if sweeps:
             sweep_batch(
                 field.terrain, source, line, record, waiting, light, plan.optics, bins
             )
         else:
-            tree = None if isinstance(target, Field) else target.tree()
+            tree = target.tree() if isinstance(target, EmbreeField) else None
             trace_batch(
                 field.terrain, tree, source, record, waiting, light, plan.optics, bins
             )

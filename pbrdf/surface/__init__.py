@@ -1,10 +1,20 @@
-"""Height maps and random surfaces."""
+"""Height maps, random surfaces and meshes."""
 
 from pbrdf.surface.gaussian import GaussianSurface
 from pbrdf.surface.heightmap import HeightMap
 from pbrdf.surface.measured import MeasuredSurface
+from pbrdf.surface.mesh import MeshSurface
 
-__all__ = ["GaussianSurface", "HeightMap", "MeasuredSurface", "Surface"]
+__all__ = [
+    "FixedSurface",
+    "GaussianSurface",
+    "HeightMap",
+    "MeasuredSurface",
+    "MeshSurface",
+    "Surface",
+]
 
+# One surface, and not an ensemble of which realisations are drawn
+FixedSurface = HeightMap | MeshSurface
 # What a scene may stand on
-Surface = HeightMap | GaussianSurface | MeasuredSurface
+Surface = FixedSurface | GaussianSurface | MeasuredSurface

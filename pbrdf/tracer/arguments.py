@@ -9,7 +9,7 @@ import numpy.typing as npt
 from pbrdf.errors import check_seed, one_number, require
 from pbrdf.kernels.paths.shading import base_strength
 from pbrdf.scene.scene import Contamination, Scene
-from pbrdf.surface import HeightMap, Surface
+from pbrdf.surface import FixedSurface, HeightMap, MeshSurface, Surface
 from pbrdf.validity import Judgement, judge, resolution_warnings, roughness_of
 
 STOKES_COUNT = {"full": 4, "linear": 3, "unpolarized": 1}
@@ -204,14 +204,14 @@ def scene_warnings(scene: Scene, drawn: int) -> list[str]:
             f"{drawn} realizations are too few for honest standard errors; "
             "ask for 16 or more."
         )
-    if not isinstance(scene.surface, HeightMap):
+    if not isinstance(scene.surface, FixedSurface):
         notes += resolution_warnings(roughness_of(scene.surface))
     return notes
 
 
 def judge_surface(scene: Scene, angles: np.ndarray, waves: np.ndarray | None) -> Judgement:
-    """Judge the surface of a scene, where a wavelength is known."""
-    if waves is None:
+    """Judge the surface of a scene, where a wavelength is known; not that of a mesh."""
+    if waves is None or isinstance(scene.surface, MeshSurface):
         return Judgement()
     return judge(roughness_of(scene.surface), angles, waves)
 
@@ -219,7 +219,7 @@ def judge_surface(scene: Scene, angles: np.ndarray, waves: np.ndarray | None) ->
 def varies(scene: Scene) -> bool:
     """Whether realisations of the scene differ."""
     drawn = any(getattr(one, "random", False) for one in scene.contaminants)
-    return drawn or not isinstance(scene.surface, HeightMap)
+    return drawn or not isinstance(scene.surface, FixedSurface)
 
 
 def in_range(name: str, value: float, low: float, high: float, cure: str) -> float:
@@ -266,5 +266,7 @@ def _isotropic(surface: Surface) -> bool:
     """Whether a surface is its own mirror image in the mean over azimuth."""
     if isinstance(surface, HeightMap):
         return surface.labels is None and not np.ptp(surface.heights)
+    if isinstance(surface, MeshSurface):
+        return False
     # The diagonal of a cell is its own image where both steps are the same
     return len({*np.ravel(surface.corr_length)}) == len({*np.ravel(surface.spacing)}) == 1

@@ -20,10 +20,10 @@ from pbrdf.tracer.mesh import Mesh, build_mesh
 # Numbers of Embree's C interface, the same in every version 4
 EMBREE = 4
 PROPERTY_VERSION = 0
-GEOMETRY_TRIANGLES = 0
+GEOMETRY_TRIANGLES, GEOMETRY_INSTANCE = 0, 121
 BUFFER_INDEX, BUFFER_VERTEX = 0, 1
-FORMAT_UINT3, FORMAT_FLOAT3 = 0x5003, 0x9003
-SCENE_ROBUST = 1 << 2
+FORMAT_UINT3, FORMAT_FLOAT3, FORMAT_FLOAT3X4_COLUMNS = 0x5003, 0x9003, 0x9234
+SCENE_ROBUST, SCENE_ASKS_BACK = 1 << 2, 1 << 3
 ALIGNMENT = 64
 
 # A scene takes no geometry of another device, and a cache alone lets two threads make one
@@ -41,6 +41,8 @@ _SIGNATURES = {
         _HANDLE,
         [_HANDLE, _NUMBER, _NUMBER, _NUMBER, ctypes.c_size_t, ctypes.c_size_t],
     ),
+    "rtcSetGeometryInstancedScene": (None, [_HANDLE, _HANDLE]),
+    "rtcSetGeometryTransform": (None, [_HANDLE, _NUMBER, _NUMBER, _HANDLE]),
     "rtcCommitGeometry": (None, [_HANDLE]),
     "rtcAttachGeometry": (_NUMBER, [_HANDLE, _HANDLE]),
     "rtcReleaseGeometry": (None, [_HANDLE]),
@@ -91,8 +93,8 @@ def device() -> int:
         return _make_device()
 
 
-def build_tree(mesh: Mesh) -> int:
-    """Build Embree's scene of a mesh, whose arrays it copies.
+def build_tree(vertices: np.ndarray, faces: np.ndarray, flags: int = SCENE_ROBUST) -> int:
+    """Build Embree's scene of triangles (float32, int32), whose arrays it copies.
 
     Raises
     ------
@@ -101,11 +103,11 @@ def build_tree(mesh: Mesh) -> int:
     """
     embree, home = library(), device()
     scene: int = embree.rtcNewScene(home)
-    embree.rtcSetSceneFlags(scene, SCENE_ROBUST)
+    embree.rtcSetSceneFlags(scene, flags)
     geometry = embree.rtcNewGeometry(home, GEOMETRY_TRIANGLES)
     for kind, form, array in (
-        (BUFFER_VERTEX, FORMAT_FLOAT3, mesh.vertices),
-        (BUFFER_INDEX, FORMAT_UINT3, mesh.faces),
+        (BUFFER_VERTEX, FORMAT_FLOAT3, vertices),
+        (BUFFER_INDEX, FORMAT_UINT3, faces),
     ):
         # Embree makes its own buffer a little longer, as it reads 16 bytes at a time
         buffer = embree.rtcSetNewGeometryBuffer(
@@ -117,12 +119,44 @@ def build_tree(mesh: Mesh) -> int:
     embree.rtcAttachGeometry(scene, geometry)
     embree.rtcReleaseGeometry(geometry)
     embree.rtcCommitScene(scene)
-    error = embree.rtcGetDeviceError(home)
-    if error:
-        embree.rtcReleaseScene(scene)
-        msg = f"Embree built no tree over {len(mesh.faces)} faces: error {error}."
-        raise RuntimeError(msg)
+    check_built(scene, f"{len(faces)} faces")
     return scene
+
+
+def build_images(tree: int, moves: np.ndarray, flags: int = SCENE_ROBUST) -> int:
+    """Build a scene of images of a tree, each moved by (x, y); it keeps the tree alive.
+
+    Raises
+    ------
+    RuntimeError
+        If Embree reports an error.
+    """
+    embree, home = library(), device()
+    scene: int = embree.rtcNewScene(home)
+    embree.rtcSetSceneFlags(scene, flags)
+    for x, y in moves:
+        geometry = embree.rtcNewGeometry(home, GEOMETRY_INSTANCE)
+        embree.rtcSetGeometryInstancedScene(geometry, tree)
+        # The columns of a rotation, here none, and the shift
+        columns = np.array([1, 0, 0, 0, 1, 0, 0, 0, 1, x, y, 0], dtype=np.float32)
+        embree.rtcSetGeometryTransform(
+            geometry, 0, FORMAT_FLOAT3X4_COLUMNS, columns.ctypes.data
+        )
+        embree.rtcCommitGeometry(geometry)
+        embree.rtcAttachGeometry(scene, geometry)
+        embree.rtcReleaseGeometry(geometry)
+    embree.rtcCommitScene(scene)
+    check_built(scene, f"{len(moves)} images")
+    return scene
+
+
+def check_built(scene: int, of: str) -> None:
+    """Raise if Embree has built nothing."""
+    error = library().rtcGetDeviceError(device())
+    if error:
+        library().rtcReleaseScene(scene)
+        msg = f"Embree built no tree over {of}: error {error}."
+        raise RuntimeError(msg)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,7 +171,7 @@ class EmbreeField:
     def of(cls, field: Field) -> "EmbreeField":
         """Build the mesh and the tree."""
         mesh = build_mesh(field)
-        made = cls(field=field, mesh=mesh, scene=build_tree(mesh))
+        made = cls(field=field, mesh=mesh, scene=build_tree(mesh.vertices, mesh.faces))
         weakref.finalize(made, library().rtcReleaseScene, made.scene)
         return made
 

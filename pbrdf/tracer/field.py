@@ -38,6 +38,15 @@ def cone_rim(
     )
 
 
+def count_lines(width: float, depth: float, n_rays: int, half_angle: float) -> int:
+    """Count the lines that space `n_rays` rays evenly both along and across them.
+
+    All rays of a line come from one direction: a source of some width has more lines.
+    """
+    lines = round(np.sqrt(n_rays * min(width, depth) / max(width, depth)))
+    return max(1, min(lines * (LINES_OF_A_DISC if half_angle > 0.0 else 1), n_rays))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Field:
     """One surface as the kernels take it, built once for all directions.
@@ -94,14 +103,9 @@ class Field:
         return float(self.terrain.z_top - self.z_bottom)
 
     def entry_lines(self, launch: np.ndarray, n_rays: int, half_angle: float = 0.0) -> int:
-        """Count the lines that space `n_rays` rays evenly both along and across them.
-
-        All rays of a line come from one direction: a source of some width has more lines.
-        """
+        """Count the lines of entry points of a launch rectangle; see `count_lines`."""
         width, depth = launch[2] * self.pitch[0], launch[3] * self.pitch[1]
-        aspect = min(width, depth) / max(width, depth)
-        lines = round(np.sqrt(n_rays * aspect))
-        return max(1, min(lines * (LINES_OF_A_DISC if half_angle > 0.0 else 1), n_rays))
+        return count_lines(width, depth, n_rays, half_angle)
 
     def entry_rectangle(
         self, theta_i: float, phi_i: float | None, half_angle: float = 0.0

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, Surface
+from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
 
 # Lines of a map that are looked at along each axis, and heights of it that are kept
 LINES, HEIGHTS = 256, 8192
@@ -77,7 +77,7 @@ class Roughness:
         return np.maximum(share - 5.0 / max(self.lengths, 1.0) ** 2, gaussian)
 
 
-def roughness_of(surface: Surface) -> Roughness:
+def roughness_of(surface: HeightMap | GaussianSurface | MeasuredSurface) -> Roughness:
     """Find the scales of a surface: from its formula, or from the heights of a map."""
     if isinstance(surface, HeightMap):
         return _of_map(surface)

@@ -16,6 +16,7 @@ from pbrdf.kernels.paths.shading import (
     SPECULAR,
     TURN_C,
     TURN_S,
+    WEIGHT,
     add_light,
     begin_columns,
     lost_energy,
@@ -23,6 +24,7 @@ from pbrdf.kernels.paths.shading import (
     reflect_often,
     reflect_twice,
     turn_columns,
+    weigh,
 )
 
 # First row of a path in the buffer, before its records: fate, bounces, bin
@@ -97,6 +99,7 @@ def shade_paths(w, spectra, optics, flux, slot, energy, mueller):
         n_stokes = optics.n_stokes if end == N_ESCAPED else 1
         if not mirror_path(paths, row + 1, bounces, w, table, n_stokes, mueller):
             reflect_often(paths[row + 1 :], 0, bounces, w, optics, n_stokes, mueller)
+        weigh(paths[row + 1 + bounces, 0, WEIGHT], optics, n_stokes, mueller)
         energy[w, ABSORBED] -= mueller[0, 0]
         if end != N_ESCAPED:
             energy[w, lost_energy(end)] += mueller[0, 0]

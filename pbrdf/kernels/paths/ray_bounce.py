@@ -11,15 +11,16 @@ GRAZING = 1e-15
 
 
 @jit(forceinline=True)
-def reflect(k_x, k_y, k_z, slope_x, slope_y):
-    """Mirror direction at a facet, the facet's normal and the cosine of incidence.
-
-    The normal comes with 1 / n_z, its length before it was made a unit vector.
-    """
+def normal_of_slopes(slope_x, slope_y):
+    """Give the unit normal of a facet of a height field, and 1 / n_z."""
     length = math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
     n_z = 1.0 / length
-    n_x = -slope_x * n_z
-    n_y = -slope_y * n_z
+    return -slope_x * n_z, -slope_y * n_z, n_z, length
+
+
+@jit(forceinline=True)
+def reflect_at(k_x, k_y, k_z, n_x, n_y, n_z):
+    """Mirror direction at a unit normal and the cosine of incidence."""
     cos_beta = max(-(k_x * n_x + k_y * n_y + k_z * n_z), GRAZING)
     r_x = k_x + 2.0 * cos_beta * n_x
     r_y = k_y + 2.0 * cos_beta * n_y
@@ -27,23 +28,31 @@ def reflect(k_x, k_y, k_z, slope_x, slope_y):
     # Keep the direction a unit vector over any number of bounces: one step of Newton's
     # rule for 1 / sqrt(r . r), which is 1 but for rounding
     scale = 1.5 - 0.5 * (r_x * r_x + r_y * r_y + r_z * r_z)
-    return r_x * scale, r_y * scale, r_z * scale, n_x, n_y, n_z, length, cos_beta
+    return r_x * scale, r_y * scale, r_z * scale, cos_beta
+
+
+@jit(forceinline=True)
+def mirror_at(k_x, k_y, k_z, n_x, n_y, n_z):
+    """Reflect a beam at a unit normal.
+
+    Returns the new direction, the s axis k x n, the same before and after (not of unit
+    length: only its direction counts), and the cosine of incidence.
+    """
+    r_x, r_y, r_z, cos_beta = reflect_at(k_x, k_y, k_z, n_x, n_y, n_z)
+    w_x = k_y * n_z - k_z * n_y
+    w_y = k_z * n_x - k_x * n_z
+    w_z = k_x * n_y - k_y * n_x
+    return r_x, r_y, r_z, w_x, w_y, w_z, cos_beta
 
 
 @jit(forceinline=True)
 def mirror(k_x, k_y, k_z, slope_x, slope_y):
-    """Reflect a beam at a facet.
+    """Reflect a beam at a facet of a height field, as `mirror_at`.
 
-    Returns the new direction, the s axis k x n of the facet, the same before and after (not
-    of unit length: only its direction counts), the speed at which the ray leaves the facet
-    upwards and the cosine of incidence.
+    The speed at which the ray leaves the facet upwards comes before the cosine.
     """
-    r_x, r_y, r_z, n_x, n_y, n_z, length, cos_beta = reflect(
-        k_x, k_y, k_z, slope_x, slope_y
-    )
-    w_x = k_y * n_z - k_z * n_y
-    w_y = k_z * n_x - k_x * n_z
-    w_z = k_x * n_y - k_y * n_x
+    n_x, n_y, n_z, length = normal_of_slopes(slope_x, slope_y)
+    r_x, r_y, r_z, w_x, w_y, w_z, cos_beta = mirror_at(k_x, k_y, k_z, n_x, n_y, n_z)
     # It leaves the plane as fast as it came, cos(beta) along the normal
     return r_x, r_y, r_z, w_x, w_y, w_z, cos_beta * length, cos_beta
 
@@ -85,25 +94,32 @@ def exit_turn(k_x, k_y, k_z, s_x, s_y, s_z, cos_phi_i, sin_phi_i):
 
 @jit
 def scatter(slope_x, slope_y, draw_a, draw_b):
-    """Direction spread as the cosine about a facet's normal, from two uniform numbers.
+    """Spread light about the normal of a facet of a height field, as `scatter_at`.
 
-    Returns the direction, its s axis k x n, the speed at which the ray leaves the facet
-    upwards and the cosine of exit.
+    The speed at which the ray leaves the facet upwards comes before the cosine.
     """
-    length = math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
-    n_x = -slope_x / length
-    n_y = -slope_y / length
-    n_z = 1.0 / length
-    # Axes across the normal (Duff et al. 2017); a facet never faces down
-    share = -1.0 / (1.0 + n_z)
+    n_x, n_y, n_z, length = normal_of_slopes(slope_x, slope_y)
+    k_x, k_y, k_z, s_x, s_y, s_z, cosine = scatter_at(n_x, n_y, n_z, draw_a, draw_b)
+    return k_x, k_y, k_z, s_x, s_y, s_z, cosine * length, cosine
+
+
+@jit
+def scatter_at(n_x, n_y, n_z, draw_a, draw_b):
+    """Direction spread as the cosine about a unit normal, from two uniform numbers.
+
+    Returns the direction, its s axis k x n and the cosine of exit.
+    """
+    # Axes across the normal (Duff et al. 2017)
+    sign = 1.0 if n_z >= 0.0 else -1.0
+    share = -1.0 / (sign + n_z)
     mixed = n_x * n_y * share
     sine = math.sqrt(draw_a)
     cosine = max(math.sqrt(1.0 - draw_a), GRAZING)
     a = sine * math.cos(TWO_PI * draw_b)
     b = sine * math.sin(TWO_PI * draw_b)
-    k_x = a * (1.0 + n_x * n_x * share) + b * mixed + cosine * n_x
-    k_y = a * mixed + b * (1.0 + n_y * n_y * share) + cosine * n_y
-    k_z = -a * n_x - b * n_y + cosine * n_z
+    k_x = a * (1.0 + sign * n_x * n_x * share) + b * mixed + cosine * n_x
+    k_y = a * (sign * mixed) + b * (sign + n_y * n_y * share) + cosine * n_y
+    k_z = -a * (sign * n_x) - b * n_y + cosine * n_z
     s_x = k_y * n_z - k_z * n_y
     s_y = k_z * n_x - k_x * n_z
     s_z = k_x * n_y - k_y * n_x
@@ -115,5 +131,5 @@ def scatter(slope_x, slope_y, draw_a, draw_b):
         s_z *= scale
     else:
         # Along the normal every axis across it serves
-        s_x, s_y, s_z = 1.0 + n_x * n_x * share, mixed, -n_x
-    return k_x, k_y, k_z, s_x, s_y, s_z, cosine * length, cosine
+        s_x, s_y, s_z = 1.0 + sign * n_x * n_x * share, sign * mixed, -sign * n_x
+    return k_x, k_y, k_z, s_x, s_y, s_z, cosine

@@ -25,15 +25,19 @@ Tally = namedtuple("Tally", "zenith azimuth flux lit energy counts mueller")
 # Columns of a record
 TURN_C, TURN_S, COS_IN, COS_OUT, LABEL, N_RECORD = 0, 1, 2, 3, 4, 5
 SPECULAR = -1.0  # in COS_OUT: mirror reflection
+# In the last record of a path over a diffuse base, as for how many like it the path stands
+WEIGHT = COS_IN
 
 # What became of the rays of a sample, the path segments they took, and the hits of a facet
 # just left (impossible but for rounding inside the intersector)
 N_ESCAPED, N_TRUNCATED, N_LEAKED, N_SIDE, N_SEGMENTS, N_SELF = 0, 1, 2, 3, 4, 5
 N_ORDERS = 6  # then the escaped paths by class of bounces
 # Beams that were inside of a body without having entered it
-N_MISMATCH, N_COUNTS = 9, 10
+N_MISMATCH = 9
+# On meshes: paths that left below bodies, and exact searches for a facet
+N_BELOW, N_EXACT, N_COUNTS = 10, 11, 12
 # Energies of unpolarised light
-ABSORBED, TRUNCATED, LEAKED, SIDEWAYS, N_ENERGIES = 0, 1, 2, 3, 4
+ABSORBED, TRUNCATED, LEAKED, SIDEWAYS, TRANSMITTED, N_ENERGIES = 0, 1, 2, 3, 4, 5
 
 
 @jit
@@ -210,10 +214,21 @@ def path_mueller(record, ray, bounces, w, optics, n_stokes, mueller):
 
 
 @jit(forceinline=True)
+def weigh(weight, optics, n_stokes, mueller):
+    """Multiply a matrix by the weight of its path, which only a diffuse base gives it."""
+    if optics.base.shape[1] > 0 and weight != 1.0:
+        for row in range(n_stokes):
+            for column in range(n_stokes):
+                mueller[row, column] *= weight
+
+
+@jit(forceinline=True)
 def lost_energy(end):
     """Column of the energy of a path that did not escape."""
     if end == N_TRUNCATED:
         return TRUNCATED
+    if end == N_BELOW:
+        return TRANSMITTED
     return SIDEWAYS if end == N_SIDE else LEAKED
 
 
@@ -253,6 +268,7 @@ def tally_path(end, record, ray, bounces, i_theta, i_dphi, optics, tally):
         lost = lost_energy(end)
         for w in range(energy.shape[0]):
             path_mueller(record, ray, bounces, w, optics, 1, mueller)
+            weigh(record[bounces, ray, WEIGHT], optics, 1, mueller)
             energy[w, ABSORBED] -= mueller[0, 0]
             energy[w, lost] += mueller[0, 0]
         return
@@ -261,5 +277,6 @@ def tally_path(end, record, ray, bounces, i_theta, i_dphi, optics, tally):
     tally.lit[order, i_theta, i_dphi] = True
     for w in range(energy.shape[0]):
         path_mueller(record, ray, bounces, w, optics, n_stokes, mueller)
+        weigh(record[bounces, ray, WEIGHT], optics, n_stokes, mueller)
         energy[w, ABSORBED] -= mueller[0, 0]
         add_light(mueller, n_stokes, flux, w, order, i_theta, i_dphi)

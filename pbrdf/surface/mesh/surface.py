@@ -1,0 +1,247 @@
+"""A surface of triangles, overhangs included."""
+
+import warnings
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pbrdf.errors import AccuracyWarning, DataFileError, require
+from pbrdf.surface.heightmap import HeightMap
+from pbrdf.surface.mesh.mending import checked_arrays, mend, without_flat_faces
+from pbrdf.surface.mesh.reading import Raw, micrometres, raw_mesh
+from pbrdf.surface.mesh.sides import with_sides
+from pbrdf.surface.mesh.topology import face_vectors
+
+# Labels of faces by the part of a file that they come from
+PARTS = "parts"
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class MeshSurface:
+    """Triangles that look out of an opaque solid; they may hang over and hide each other.
+
+    Parameters
+    ----------
+    mesh : trimesh.Trimesh, str, Path or (vertices, faces)
+        The triangles, or a file of them: STL, PLY, OBJ, GLB, glTF or OFF. z points up.
+        Numbers are micrometres unless `unit` or the units of the Trimesh say otherwise.
+    period : (float, float), optional
+        Periods lx, ly along x and y; all images of the mesh are there. Without it the mesh
+        is alone: closed bodies in the open, or a sheet of which the rim is left out. [um]
+    labels : array_like of shape (faces,) or "parts", optional
+        Number of the material of each face, or those of the parts of a file in their order.
+    unit : {"um", "nm", "mm", "cm", "m", "inch"}, optional
+        Unit of the numbers in `mesh`; `period` stays in micrometres.
+
+    Attributes
+    ----------
+    vertices : ndarray, shape (vertices, 3)
+        Corners of the faces. [um]
+    faces : ndarray, shape (faces, 3)
+        Their corners, counter-clockwise as seen from outside.
+    kind : {"ground", "bodies", "sheet"}
+        Whether the mesh is closed towards below, so that no light passes; or bodies with
+        nothing under them; or an open sheet.
+    repairs : tuple of str
+        What was mended, with counts and places; each is also a warning.
+
+    Raises
+    ------
+    DataFileError
+        If a file is damaged or its mesh is one that this class refuses.
+    TypeError, ValueError
+        If the mesh has holes, one-sided parts, faces back to back, a wrong period, vertices
+        that are not finite; or a label is missing.
+
+    Warns
+    -----
+    AccuracyWarning
+        If faces were left out or turned.
+
+    Examples
+    --------
+    >>> pyramid = ([(0, 0, 0), (4, 0, 0), (4, 4, 0), (0, 4, 0), (2, 2, 1)],
+    ...            [(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)])
+    >>> MeshSurface(pyramid, period=(4, 4))
+    MeshSurface(4 faces, ground, period=(4.0, 4.0) um)
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    labels: np.ndarray | None
+    period: tuple[float, float] | None
+    kind: str
+    repairs: tuple[str, ...] = field(repr=False)
+
+    def __init__(
+        self,
+        mesh: Any,
+        period: tuple[float, float] | None = None,
+        labels: npt.ArrayLike | str | None = None,
+        *,
+        unit: str | None = None,
+    ) -> None:
+        raw = raw_mesh(mesh)
+        lengths = None if period is None else _checked_period(period)
+        try:
+            self._build(raw, lengths, labels, micrometres(unit, raw.unit))
+        except DataFileError:
+            raise
+        except (TypeError, ValueError) as error:
+            if not isinstance(mesh, str | Path):
+                raise
+            problem, _, cure = str(error).rstrip(".").rpartition(". ")
+            raise DataFileError(Path(mesh), problem or cure, f"{cure}.") from error
+        for note in self.repairs:
+            warnings.warn(note, AccuracyWarning, stacklevel=2)
+
+    def _build(
+        self,
+        raw: Raw,
+        period: tuple[float, float] | None,
+        labels: npt.ArrayLike | str | None,
+        unit: float,
+    ) -> None:
+        vertices, faces = checked_arrays(raw.vertices, raw.faces)
+        if _is_parts(labels):
+            labels = raw.parts
+        elif labels is None:
+            labels = raw.labels
+        numbers = _checked_labels(labels, len(faces))
+        sided = with_sides(mend(vertices * unit, faces, numbers), period)
+        done = without_flat_faces(sided.mesh)
+        if period is not None:
+            _check_extent(done.vertices, period)
+        table = done.faces.astype(np.int32)
+        for array in (done.vertices, table, done.labels):
+            if array is not None:
+                array.setflags(write=False)
+        for name, value in (
+            ("vertices", done.vertices), ("faces", table), ("labels", done.labels),
+            ("period", period), ("kind", sided.kind), ("repairs", done.notes),
+        ):  # fmt: skip
+            object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        lies = "alone" if self.period is None else f"period={self.period} um"
+        return f"MeshSurface({len(self.faces)} faces, {self.kind}, {lies})"
+
+    @classmethod
+    def of_map(cls, surface: HeightMap) -> "MeshSurface":
+        """Triangles of a height map, the same facets."""
+        if surface.missing > 0.0:
+            msg = (
+                f"heights must be complete, got {100 * surface.missing:.2g} % missing. "
+                "Fill the holes with HeightMap.filled()."
+            )
+            raise ValueError(msg)
+        nx, ny = (k + 1 for k in surface.cells)
+        dx, dy = surface.spacing
+        i, j = np.arange(nx), np.arange(ny)
+        heights = surface.heights[np.ix_(i % surface.shape[0], j % surface.shape[1])]
+        x, y = np.meshgrid(i * dx, j * dy, indexing="ij")
+        number = np.arange(nx * ny).reshape(nx, ny)
+        z00, z10 = number[:-1, :-1], number[1:, :-1]
+        z01, z11 = number[:-1, 1:], number[1:, 1:]
+        low = np.stack([z00, z10, z11], axis=-1)
+        high = np.stack([z00, z11, z01], axis=-1)
+        labels = None if surface.labels is None else np.repeat(surface.labels.ravel(), 2)
+        return cls(
+            (
+                np.stack([x, y, heights], axis=-1).reshape(-1, 3),
+                np.stack([low, high], axis=2).reshape(-1, 3),
+            ),
+            surface.size if surface.periodic else None,
+            labels,
+        )
+
+    @cached_property
+    def bounds(self) -> np.ndarray:
+        """Lowest and highest x, y and z of the mesh, shape (2, 3). [um]"""
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Unit normals of the faces, out of the solid, shape (faces, 3). [1]"""
+        vectors = face_vectors(self.vertices, self.faces)
+        unit: np.ndarray = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+        return unit
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """Areas of the faces, shape (faces,). [um²]"""
+        areas: np.ndarray = 0.5 * np.linalg.norm(
+            face_vectors(self.vertices, self.faces), axis=1
+        )
+        return areas
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Period, or lateral lengths of the mesh, along x and y. [um]"""
+        if self.period is not None:
+            return self.period
+        low, high = self.bounds
+        return float(high[0] - low[0]), float(high[1] - low[1])
+
+    def to_trimesh(self) -> Any:
+        """Trimesh of the same faces, for viewing, printing and all else it can do."""
+        import trimesh
+
+        return trimesh.Trimesh(
+            np.array(self.vertices), np.array(self.faces), process=False, units="um"
+        )
+
+
+def _is_parts(labels: npt.ArrayLike | str | None) -> bool:
+    if isinstance(labels, str) and labels != PARTS:
+        msg = f'labels must be numbers of materials or "{PARTS}", got {labels!r}.'
+        raise ValueError(msg)
+    return isinstance(labels, str)
+
+
+def _checked_labels(labels: Any, faces: int) -> np.ndarray | None:
+    """One number of a material for each face."""
+    if labels is None:
+        return None
+    numbers = require(
+        "labels", labels, lambda v: (v >= 0) & (v <= 255) & (v == np.floor(v)),
+        "be whole numbers in [0, 255]", "Number the materials from 0.",
+    )  # fmt: skip
+    if numbers.shape != (faces,):
+        msg = (
+            f"labels must have one number for each of the {faces} faces, got shape "
+            f"{numbers.shape}. Number the materials of faces from 0."
+        )
+        raise ValueError(msg)
+    return numbers.astype(np.uint8)
+
+
+def _checked_period(period: tuple[float, float]) -> tuple[float, float]:
+    lengths = require(
+        "period", period, lambda v: (v > 0) & np.isfinite(v), "be positive [um]",
+        "Give (lx, ly), or None for a mesh that does not repeat.",
+    )  # fmt: skip
+    if lengths.shape != (2,):
+        msg = f"period must be (lx, ly) [um], got shape {lengths.shape}."
+        raise ValueError(msg)
+    return float(lengths[0]), float(lengths[1])
+
+
+def _check_extent(vertices: np.ndarray, period: tuple[float, float]) -> None:
+    """Refuse a mesh that overlaps so many of its images that the period must be wrong."""
+    widths = np.ptp(vertices[:, :2], axis=0)
+    laps = float((widths / period).max())
+    if laps > MOST_LAPS:
+        msg = (
+            f"period must be no less than an {MOST_LAPS}th of the mesh [um], got {period} "
+            f"for a mesh of {widths[0]:.4g} x {widths[1]:.4g} um. Check the unit."
+        )
+        raise ValueError(msg)
+
+
+# A mesh may reach over so many of its periods
+MOST_LAPS = 8
