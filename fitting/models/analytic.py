@@ -111,7 +111,7 @@ class AnalyticModel:
             for field in fields(self.model)
             if field.name not in skip
         }
-        base = self.model.volume_albedo or self.model.material.diffuse_albedo
+        base = self.model.volume_albedo or float(self.model.material.albedo())
         return {**numbers, "volume_albedo": base}
 
 

@@ -74,7 +74,7 @@ def opaque_material(scene: Scene) -> Material:
         reason = "a mesh"
     elif scene.contaminants:
         reason = "contaminants"
-    elif material.diffuse_albedo > 0.0:
+    elif material.has_base:
         reason = "a diffuse base under the interface"
     if reason:
         msg = (

@@ -118,6 +118,14 @@ class MicrofacetModel:
                 name, value, lambda v: (v >= 0) & (v <= 1), "lie in [0, 1] [1]",
                 "It is a fraction.",
             )  # fmt: skip
+        if callable(self.material.diffuse_albedo):
+            low, high = self.material.diffuse_albedo.valid_range
+            msg = (
+                "diffuse_albedo of the material must be one number in the analytical "
+                f"model, got a table from {low:g} to {high:g} um. Make a model for each "
+                "wavelength; the Monte Carlo takes tables."
+            )
+            raise ValueError(msg)
         if self.volume_albedo and self.material.diffuse_albedo:
             msg = (
                 f"volume_albedo must be 0 over a material with diffuse_albedo "
@@ -316,7 +324,7 @@ height_rms.
 
     def _diffuse(self) -> Diffuse:
         """Numbers of the terms (22) and (23)."""
-        volume_albedo = float(self.volume_albedo or self.material.diffuse_albedo)
+        volume_albedo = float(self.volume_albedo or self.material.albedo())
         return Diffuse(
             float(self.diffuse_albedo),
             float(self.grazing_albedo),

@@ -24,7 +24,7 @@ class Material:
         Real part, > 0; `inf` is a perfect mirror. [1]
     kappa : float or Dispersion
         Imaginary part, >= 0, positive in an absorber (fields as exp(-i w t)). [1]
-    diffuse_albedo : float
+    diffuse_albedo : float or Table
         Albedo in [0, 1] of a Lambertian base under the interface. [1]
     name : str, optional
         For messages and results.
@@ -50,7 +50,7 @@ class Material:
 
     n: float | Dispersion
     kappa: float | Dispersion = 0.0
-    diffuse_albedo: float = 0.0
+    diffuse_albedo: float | Table = 0.0
     name: str | None = None
     source: str | None = None
     absorbs_all: bool = False
@@ -60,16 +60,20 @@ class Material:
             object.__setattr__(self, "n", _scalar("n", checked_n(self.n)))
         if not callable(self.kappa):
             object.__setattr__(self, "kappa", _scalar("kappa", checked_kappa(self.kappa)))
+        tabulated = isinstance(self.diffuse_albedo, Table)
+        given: Any = self.diffuse_albedo
         albedo = require(
-            "diffuse_albedo", self.diffuse_albedo, lambda v: (v >= 0) & (v <= 1),
-            "lie in [0, 1] [1]", "It is a fraction of the light.",
+            "diffuse_albedo", given.values if tabulated else given,
+            lambda v: (v >= 0) & (v <= 1), "lie in [0, 1] [1]",
+            "It is a fraction of the light.",
         )  # fmt: skip
-        object.__setattr__(self, "diffuse_albedo", _scalar("diffuse_albedo", albedo))
+        if not tabulated:
+            object.__setattr__(self, "diffuse_albedo", _scalar("diffuse_albedo", albedo))
         bare = (self.n, self.kappa, self.diffuse_albedo) == (1.0, 0.0, 0.0)
         if self.absorbs_all and not bare:
             msg = (
                 f"absorbs_all must stand with n = 1 and kappa = 0, got n {self.n}, kappa "
-                f"{self.kappa} and diffuse_albedo {self.diffuse_albedo:g}. A perfect "
+                f"{self.kappa} and diffuse_albedo {self.diffuse_albedo}. A perfect "
                 "absorber has no interface; leave it out, or the constants."
             )
             raise ValueError(msg)
@@ -91,7 +95,7 @@ class Material:
         wavelength: npt.ArrayLike,
         n: npt.ArrayLike,
         kappa: npt.ArrayLike = 0.0,
-        diffuse_albedo: float = 0.0,
+        diffuse_albedo: npt.ArrayLike | Table = 0.0,
         name: str | None = None,
         source: str | None = None,
     ) -> "Material":
@@ -108,7 +112,11 @@ class Material:
 0.90000000000000002. Optical constants are not extrapolated; wavelengths are in micrometres.
         """
         absorption = kappa if np.ndim(kappa) == 0 else Table.of("kappa", wavelength, kappa)
-        return cls(Table.of("n", wavelength, n), absorption, diffuse_albedo, name, source)  # type: ignore[arg-type]
+        albedo: Any = diffuse_albedo
+        if not isinstance(albedo, Table) and np.ndim(albedo) > 0:
+            albedo = Table.of("diffuse_albedo", wavelength, albedo)
+        index: Any = n if np.ndim(n) == 0 else Table.of("n", wavelength, n)
+        return cls(index, absorption, albedo, name, source)  # type: ignore[arg-type]
 
     @property
     def dispersive(self) -> bool:
@@ -118,10 +126,34 @@ class Material:
     @property
     def valid_range(self) -> tuple[float, float]:
         """Wavelengths at which the index is known. [um]"""
-        ranges = [c.valid_range for c in (self.n, self.kappa) if callable(c)]
+        constants = (self.n, self.kappa, self.diffuse_albedo)
+        ranges = [c.valid_range for c in constants if callable(c)]
         return max((r[0] for r in ranges), default=0.0), min(
             (r[1] for r in ranges), default=inf
         )
+
+    @property
+    def has_base(self) -> bool:
+        """Whether there is a diffuse base under the interface."""
+        albedo = self.diffuse_albedo
+        return any(albedo.values) if isinstance(albedo, Table) else albedo > 0.0
+
+    def albedo(self, wavelength: npt.ArrayLike | None = None) -> np.ndarray:
+        """Albedo of the base at vacuum wavelengths of any shape [um].
+
+        Raises
+        ------
+        ValueError
+            If it is tabulated and the wavelength is missing or out of its range.
+        """
+        if callable(self.diffuse_albedo) and wavelength is None:
+            low, high = self.diffuse_albedo.valid_range
+            msg = (
+                "wavelength must be given for a tabulated diffuse_albedo, got None. "
+                f"Pass one between {low:g} and {high:g} um."
+            )
+            raise ValueError(msg)
+        return _at(self.diffuse_albedo, wavelength)
 
     def index(self, wavelength: float | None = None) -> tuple[float, float]:
         """(n, kappa) at one vacuum wavelength [um].

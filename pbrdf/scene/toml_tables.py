@@ -75,10 +75,10 @@ def material_table(material: Material) -> dict[str, Any]:
     if material.name in library.names() and library.get(str(material.name)) == material:
         return {"material": material.name}
     table: dict[str, Any] = {} if material.name is None else {"name": material.name}
-    table["diffuse_albedo"] = material.diffuse_albedo
     if material.absorbs_all:
         table["absorbs_all"] = True
-    n, kappa = material.n, material.kappa
+    n, kappa, albedo = material.n, material.kappa, material.diffuse_albedo
+    table["diffuse_albedo"] = _constant_table("diffuse_albedo", albedo)
     if isinstance(n, Entry):
         return table | {"file": f"{PREFIX}{n.address}"}
     grids = {c.wavelength for c in (n, kappa) if isinstance(c, Table)}
@@ -143,7 +143,7 @@ def read_material(table: Mapping[str, Any], place: str, source: Path) -> Materia
     if "n" not in table:
         raise DataFileError(source, f"[{place}]: key 'n' is missing", "Or give 'material'.")
     wavelength = table.pop("wavelength_um", None)
-    for key in ("n", "kappa"):
+    for key in ("n", "kappa", "diffuse_albedo"):
         if key in table:
             table[key] = _read_constant(key, table[key])
     if wavelength is None:
@@ -163,5 +163,9 @@ def _material_of_file(table: Mapping[str, Any], place: str, source: Path) -> Mat
         problem = f"[{place}]: 'file' must be a path, got {name!r}"
         raise DataFileError(source, problem, "Write file = 'constants.csv'.")
     material = read(name if name.startswith(PREFIX) else source.parent / name)
-    given = {key: table[key] for key in ("diffuse_albedo", "name") if key in table}
+    given = {
+        key: _read_constant(key, table[key])
+        for key in ("diffuse_albedo", "name")
+        if key in table
+    }
     return replace(material, **given)

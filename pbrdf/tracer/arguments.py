@@ -164,18 +164,18 @@ def constants(
     n, kappa, base = np.empty(shape), np.empty(shape), np.empty(shape)
     for column, material in enumerate(scene.materials):
         n[:, column], kappa[:, column] = material.indices(waves)
-        albedo = material.diffuse_albedo
+        albedo = np.broadcast_to(material.albedo(waves), count)
         opaque = kappa[:, column].any() or not np.isfinite(n[:, column]).all()
-        if albedo > 0.0 and opaque:
+        if material.has_base and opaque:
             msg = (
                 f"kappa must be 0 over a diffuse base [1], got {kappa[:, column].max():g} "
-                f"and diffuse_albedo {albedo:g}. "
+                f"and diffuse_albedo {albedo.max():g}. "
                 "Light does not reach a base under an absorber."
             )
             raise ValueError(msg)
         base[:, column] = [
-            base_strength(albedo, *index)
-            for index in zip(n[:, column], kappa[:, column], strict=True)
+            base_strength(*constants)
+            for constants in zip(albedo, n[:, column], kappa[:, column], strict=True)
         ]
     return n, kappa, base if base.any() else np.empty((count, 0))
 

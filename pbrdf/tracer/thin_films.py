@@ -89,7 +89,7 @@ def thin_absorber_warnings(
     found: list[str] = []
     for report, material in zip(reports, coverings, strict=True):
         thickness = report.get("thickness")
-        if thickness is None or waves is None or material.diffuse_albedo > 0.0:
+        if thickness is None or waves is None or material.has_base:
             continue
         for wave in np.atleast_1d(waves).tolist():
             film = material.index(wave)

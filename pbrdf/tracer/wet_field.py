@@ -111,11 +111,11 @@ def media_of(
     for medium, material in enumerate(contaminants, start=1):
         column = first + medium - 1
         index, absorbs = solid_n[:, column], solid_kappa[:, column]
-        opaque = np.isinf(index) | material.absorbs_all | (material.diffuse_albedo > 0.0)
-        if material.diffuse_albedo > 0.0 and absorbs.any():
+        opaque = np.isinf(index) | material.absorbs_all | material.has_base
+        if material.has_base and absorbs.any():
             msg = (
                 f"kappa must be 0 over a diffuse base [1], got {absorbs.max():g} and "
-                f"diffuse_albedo {material.diffuse_albedo:g}. "
+                f"diffuse_albedo {material.albedo(waves).max():g}. "
                 "Light does not reach a base under an absorber."
             )
             raise ValueError(msg)
@@ -129,7 +129,7 @@ def media_of(
             absorption[:, medium] = 4 * np.pi * kappa[:, medium] / waves
     base, tail = np.zeros((2, count, len(solids), n_media))
     for w, column, medium in np.ndindex(*base.shape):
-        albedo = solids[column].diffuse_albedo
+        albedo = float(np.broadcast_to(solids[column].albedo(waves), count)[w])
         if kappa[w, medium] > 0.0 and albedo > 0.0:
             base[w, column, medium], tail[w, column, medium] = _base_under_absorber(
                 albedo,

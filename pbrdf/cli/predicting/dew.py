@@ -1,7 +1,7 @@
 """`pbrdf dew`: the same water on a surface at several contact angles."""
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -53,9 +53,16 @@ def command(
     diffuse_albedo: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="Of the paint under its interface.")
     ] = 0.0,
+    wavelength: options.Wavelengths = None,
     water_n: Annotated[
-        float, typer.Option(min=1.0001, max=5.0, help="Refractive index of the water.")
-    ] = 1.333,
+        float | None,
+        typer.Option(
+            min=1.0001,
+            max=5.0,
+            help="Index of water that does not absorb; if not given, 1.333 without "
+            "wavelengths, and with them the constants of the library.",
+        ),
+    ] = None,
     output: options.Output = None,
     force: options.Force = False,
     n_rays: Annotated[
@@ -77,11 +84,8 @@ def command(
 
     Example: pbrdf dew --contact-angles-deg 15,90,179 --theta-i-deg 40 -o dew
     """
-    import numpy as np
-
     import pbrdf
     from data_io import write_result
-    from pbrdf.cli.dew_figures import polar_figure, signature_figure
     from pbrdf.cli.progress import progress_bar
     from pbrdf.cli.staging import staged_folder
     from pbrdf.dew import compare_dew
@@ -104,38 +108,83 @@ def command(
     angles = options.angles(contact_angles, "--contact-angles-deg", below=180.0)
     incidences = options.incidences(theta_i)
     target = output or Path("dew")
+    waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
+    liquid = pbrdf.materials.get("water")
+    if waves is None or water_n is not None:
+        liquid = pbrdf.Material(water_n or 1.333, name="water")
     with staged_folder(target, force=force) as stage:
+        results = []
         with progress_bar("tracing") as progress:
-            result = compare_dew(
-                surface,
-                substrate,
-                angles,
-                incidences,
-                amount={
-                    "volume_per_area": volume,
-                    "number_density": density * 1e-6,
-                    "sizes": sizes,
-                },
-                water=pbrdf.Material(water_n, name="water"),
-                runs=runs,
-                seed=seed,
-                progress=progress,
-                n_rays=n_rays,
-                n_theta=36,
-                n_dphi=72,
-                workers=workers,
-            )
-        write_result(result, stage / "dew.nc")
+            for number, wave in enumerate(waves or [None]):
+
+                def told(done: int, total: int, number: int = number) -> None:
+                    progress(number * total + done, len(waves or [None]) * total)
+
+                results.append(
+                    compare_dew(
+                        surface,
+                        substrate,
+                        angles,
+                        incidences,
+                        amount={
+                            "volume_per_area": volume,
+                            "number_density": density * 1e-6,
+                            "sizes": sizes,
+                        },
+                        water=liquid,
+                        runs=runs,
+                        seed=seed,
+                        progress=told,
+                        n_rays=n_rays,
+                        n_theta=36,
+                        n_dphi=72,
+                        workers=workers,
+                        wavelength=wave,
+                    )
+                )
+        write_result(_joined(results), stage / "dew.nc")
         pbrdf.Scene(surface, substrate).to_toml(stage / "model.toml")
-        with (stage / "dew.csv").open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows(rows(result))
-        for number, angle in enumerate(result.theta_i.values):
-            name = f"hemisphere_{np.rad2deg(angle):.3g}deg.png"
-            polar_figure(result, number).savefig(stage / name, dpi=110)
-        signature_figure(result).savefig(stage / "polarised.png", dpi=130)
-    for line in table(result):
-        typer.echo(line)
+        _write_tables_and_figures(results, stage)
+    for result in results:
+        for line in table(result):
+            typer.echo(line)
     typer.echo(f"Result: {target}")
+
+
+def _write_tables_and_figures(results: "list[xr.Dataset]", stage: Path) -> None:
+    """Write dew.csv, and the figures of each wavelength."""
+    import numpy as np
+
+    from pbrdf.cli.dew_figures import polar_figure, signature_figure
+
+    with (stage / "dew.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        for number, result in enumerate(results):
+            writer.writerows(list(rows(result))[min(number, 1) :])
+    for result in results:
+        place = "" if len(results) == 1 else f"_{float(result.wavelength):g}um"
+        for number, angle in enumerate(result.theta_i.values):
+            name = f"hemisphere_{np.rad2deg(angle):.3g}deg{place}.png"
+            polar_figure(result, number).savefig(stage / name, dpi=110)
+        signature_figure(result).savefig(stage / f"polarised{place}.png", dpi=130)
+
+
+def _joined(results: "list[xr.Dataset]") -> "xr.Dataset":
+    """Return the results of several wavelengths as one, with a dimension for them."""
+    import xarray as xr
+
+    if len(results) == 1:
+        return results[0]
+    # Coverage and bins are those of any wavelength
+    spectral: list[Hashable] = [
+        name for name, data in results[0].data_vars.items() if "theta_i" in data.dims
+    ]
+    whole = xr.concat(
+        results, "wavelength", data_vars=spectral, coords="minimal", compat="override",
+        combine_attrs="drop_conflicts",
+    )  # fmt: skip
+    notes = dict.fromkeys(note for one in results for note in one.attrs["warnings"])
+    return whole.assign_attrs(warnings=list(notes))
 
 
 def rows(result: "xr.Dataset") -> Iterator[list[str]]:
@@ -143,7 +192,9 @@ def rows(result: "xr.Dataset") -> Iterator[list[str]]:
     import numpy as np
 
     quantities = [str(name) for name in result.quantity.values]
-    head = ["state", "contact_angle_deg", "theta_i_deg", "region"]
+    spectral = "wavelength" in result.coords
+    head = ["wavelength_um"] if spectral else []
+    head += ["state", "contact_angle_deg", "theta_i_deg", "region"]
     columns = [
         column
         for name in quantities
@@ -166,7 +217,9 @@ def rows(result: "xr.Dataset") -> Iterator[list[str]]:
                 ]
                 contact = np.rad2deg(float(here.contact_angle))
                 wet = "" if np.isnan(contact) else f"{contact:.6g}"
-                yield [str(state), wet, f"{np.rad2deg(theta_i):.6g}", str(region), *numbers]
+                place = [f"{float(result.wavelength):.6g}"] if spectral else []
+                place += [str(state), wet, f"{np.rad2deg(theta_i):.6g}", str(region)]
+                yield place + numbers
 
 
 def table(result: "xr.Dataset") -> Iterator[str]:
@@ -174,7 +227,13 @@ def table(result: "xr.Dataset") -> Iterator[str]:
     import numpy as np
 
     for theta_i in result.theta_i.values:
-        yield f"Incidence {np.rad2deg(theta_i):.4g} deg; means in 1/sr, one standard error"
+        wave = ""
+        if "wavelength" in result.coords:
+            wave = f"{float(result.wavelength):g} um, "
+        yield (
+            f"{wave}incidence {np.rad2deg(theta_i):.4g} deg; means in 1/sr, one standard "
+            "error"
+        ).capitalize()
         for region in result.region.values:
             yield f"  {region}"
             for state in result.state.values:
