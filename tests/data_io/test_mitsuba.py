@@ -6,6 +6,7 @@ With Mitsuba itself in the environment the renderer's own plugin evaluates the f
 # One line a bad case
 # ruff: noqa: E501
 
+import json
 import struct
 
 import numpy as np
@@ -93,6 +94,42 @@ def test_model_file(tmp_path):
     for node, geometry in nodes_above_horizon(fields, 60):
         expected, _ = convert_brdf(METAL.brdf(*geometry), *geometry, target="mitsuba")
         assert_allclose(fields["M"][(*node, 0)], expected, atol=2e-6 * expected[0, 0])
+
+
+@pytest.mark.parametrize("slope", [0.01, 0.3])
+def test_nodes_suit_the_lobe_and_the_file_says_how_well(tmp_path, slope):
+    """Directions of light and viewer about the lobe, interpolated here, not by the writer."""
+    from scipy.interpolate import interpn
+
+    model = MicrofacetModel(Material(1.37, kappa=7.62), slope_rms=slope)
+    stated = export_mitsuba(model, tmp_path / "metal.pbsdf")
+    fields = parse(tmp_path / "metal.pbsdf")
+    axes = [fields[name][0].astype(float) for name in ("phi_d", "theta_d", "theta_h")]
+    rng = np.random.default_rng(7)
+    points = rng.uniform([-3.1, 0.02, 0.0], [3.1, 1.3, min(1.2, 4 * slope)], (1500, 3))
+    both = [(p, *directions(*p)) for p in points]
+    both = [(p, a, b) for p, a, b in both if min(a[2], b[2]) > np.cos(np.radians(80))]
+    expected = np.array([model.brdf(*angles(a, b))[0, 0] for _, a, b in both])
+    table = fields["M"][..., 0, 0, 0].astype(float)
+    found = interpn(axes, table, np.array([p for p, *_ in both]))
+    bright = expected > 0.01 * expected.max()
+    error = np.abs(found / expected - 1)[bright]
+    assert bright.sum() > 100
+    assert np.quantile(error, 0.95) < 0.01
+    said = stated.error.isel(stokes_out=0, stokes_in=0).sel(quantile="p95")
+    assert np.quantile(error, 0.95) < 2.5 * float(said.isel(brightness=slice(2)).max())
+    beside = json.loads((tmp_path / "metal.pbsdf.json").read_text(encoding="utf-8"))
+    here = beside["error"]["M00 1 to 10 % of its peak"]["M00"]["p95"]
+    assert here == pytest.approx(float(said.sel(brightness="1 to 10 %")), abs=1e-6)
+
+
+def test_a_table_too_coarse_states_its_error(tmp_path):
+    fine = export_mitsuba(METAL, tmp_path / "fine.pbsdf")
+    coarse = export_mitsuba(METAL, tmp_path / "coarse.pbsdf", shape=(25, 16, 18))
+    ratio = coarse.error.sel(quantile="p95", brightness="1 to 10 %") / fine.error.sel(
+        quantile="p95", brightness="1 to 10 %"
+    )
+    assert float(ratio[0, 0]) > 3
 
 
 def test_a_metal_mirrors_in_the_frame_of_the_half_vector(tmp_path):
