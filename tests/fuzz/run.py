@@ -31,8 +31,22 @@ from pbrdf.errors import DataFileError
 
 SECONDS = 5.0
 MEMORY = 2**30
-WORDS = [b"nan", b"inf", b"1e400", b"-0", b"9" * 400, b"", b"\0", b"\xff\xfe", b",", b";", b"\t",
-         b"\n", b"[", b"{", b"\"", b"#", b"<!ENTITY a 'b'>", b"= 1", b"true"]  # fmt: skip
+WORDS = [
+    *(
+        b"nan",
+        b"inf",
+        b"1e400",
+        b"-0",
+        b"9" * 400,
+        b"",
+        b"\0",
+        b"\xff\xfe",
+        b",",
+        b";",
+        b"\t",
+    ),
+    *(b"\n", b"[", b"{", b'"', b"#", b"<!ENTITY a 'b'>", b"= 1", b"true"),
+]
 
 
 def csv_scan() -> bytes:
