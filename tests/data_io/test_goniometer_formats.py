@@ -243,6 +243,8 @@ def test_nist_placeholders_are_zero(tmp_path):
         (ZEMAX.replace("9\t6\t0", "9.5\t6\t0"), "line 20, column BRDF: expected one value a geometry"),
         (ZEMAX.replace("9\t6\t0", "9\t6\t-1"), "line 20, column BRDF: expected a value >= 0"),
         (ZEMAX.replace("DataEnd\n", ""), "expected a line DataEnd"),
+        ("DataBegin\nDataEnd\nScatterRadial 1\n", "column AngleOfIncidence: expected this axis"),
+        ("NUM_POINTS 0\nVARS\n", "expected names of columns and rows of numbers, found none"),
         (ZEMAX.replace("\tBRDF", "\tBTDF"), "line 6, column ScatterType: expected BRDF, got 'BTDF'"),
         (ZEMAX.replace("Radial\t3", "Radial\t4"), "column ScatterRadial: expected 4 values as announced, got 3"),
         (ZEMAX.replace("Rotation\t1\n0", "Rotation\t2\n0\t90"), "expected 2 x 2 x 3 rows, rotation"),

@@ -8,6 +8,7 @@ the azimuth of the plane of incidence on the sample: several become phi_i.
 
 import re
 import warnings
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -131,7 +132,7 @@ def _wavelength(comments: list[str]) -> float | None:
 def _header(path: Path, header: list[Line]) -> dict[str, np.ndarray]:
     """Return the values of the four axes. [deg]"""
     axes: dict[str, np.ndarray] = {}
-    for line, following in zip(header, [*header[1:], None], strict=True):
+    for line, following in zip_longest(header, header[1:]):
         cells = line.text.split()
         if cells[0] in _REQUIRED and cells[1:2] and cells[1] not in _REQUIRED[cells[0]]:
             problem = f"expected {_REQUIRED[cells[0]][0]}, got {cells[1]!r}"

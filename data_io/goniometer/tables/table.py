@@ -87,6 +87,9 @@ def read_table(path: Path, lines: Sequence[Line]) -> RawTable:
     # Spreadsheets leave rows of separators
     content = [line for line in without_comments(lines) if line.text.strip(",;\t ")]
     comments = [line.text.strip().lstrip("#% ") for line in lines if is_comment(line)]
+    if not content:
+        problem = "expected names of columns and rows of numbers, found none"
+        raise DataFileError(path, problem, "The file is truncated.")
     top = next((k for k, line in enumerate(content) if _is_row(line)), len(content))
     if top == 0:
         first = _cells(content[0].text, _separator(content[0].text))[0]
