@@ -27,12 +27,20 @@ from fitting.statistics.form import (
 )
 from fitting.statistics.mesh import MeshStatistics, mesh_statistics
 from fitting.statistics.result import SurfaceStatistics
+from fitting.statistics.special_cases import (
+    discrete_heights,
+    flat_statistics,
+    is_flat,
+    without_rounding,
+)
 from pbrdf import MeshSurface
 from pbrdf.errors import real_array
 
 Array = np.ndarray
 
 _FEWEST_POINTS = 12
+# Bands of one width are corrected as rounding to a step
+_SAME_STEP = 0.05
 
 
 class ProfileLike(Protocol):
@@ -129,16 +137,97 @@ def surface_statistics(
     if isinstance(surface, MeshSurface):
         return mesh_statistics(surface)
     degree = form_degree(form)
+    name = _form_name(degree)
+    if not (_is_map(surface) or _is_profile(surface)):
+        msg = (
+            "surface must be a Profile (x, z), a HeightMap (heights, spacing) or a "
+            f"MeshSurface, got {type(surface).__name__}. See data_io.read_profile and "
+            "read_height_map."
+        )
+        raise TypeError(msg)
+    if quantisation is None and getattr(surface, "located", None) is None:
+        reason = _discrete(surface)
+        if reason is not None:
+            found = _statistics(surface, degree, name, 0.0)
+            return found if found.height_rms.value == 0 else without_rounding(found, reason)
+        if _is_map(surface):
+            drawn = _under_uneven_bands(surface)
+            if drawn is not None:
+                text, smooth = drawn
+                found = _statistics(smooth, degree, name, 0.0)
+                return replace(found, warnings=(text, *found.warnings))
+    found = _statistics(surface, degree, name, quantisation)
     if _is_map(surface):
-        return _map_statistics(surface, degree, _form_name(degree), quantisation)
-    if _is_profile(surface):
-        return _profile_statistics(surface, degree, _form_name(degree), quantisation)
-    msg = (
-        f"surface must be a Profile (x, z), a HeightMap (heights, spacing) or a "
-        f"MeshSurface, got {type(surface).__name__}. See "
-        "data_io.read_profile and read_height_map."
+        return _with_offsets_named(found, surface)
+    slope = getattr(surface, "slope", None)
+    return found if slope is None else _with_slopes(found, surface, slope, degree)
+
+
+def _discrete(surface: ProfileLike | MapLike) -> str | None:
+    """Say why heights are discrete by themselves, for maps and evenly spaced profiles."""
+    heights = surface.heights if _is_map(surface) else surface.z  # type: ignore[union-attr]
+    values = np.asarray(real_array("heights", heights), dtype=float)
+    known = values[np.isfinite(values)]
+    if known.size < _FEWEST_POINTS or np.ptp(known) == 0:
+        return None
+    return discrete_heights(values)
+
+
+def _under_uneven_bands(surface: MapLike) -> tuple[str, MapLike] | None:
+    """Draw the surface under bands that no single step describes, as of a picture."""
+    from data_io.mending.bands import find_bands
+    from data_io.mending.terraces import deterrace
+    from pbrdf.surface.heightmap import HeightMap
+
+    heights = real_array("heights", surface.heights)
+    bands = find_bands(heights)
+    if bands is None or abs(find_step(heights) / bands.width - 1) < _SAME_STEP:
+        return None
+    dx, dy = np.broadcast_to(np.asarray(surface.spacing, dtype=float), (2,))
+    drawn = deterrace(HeightMap(heights, (float(dx), float(dy))), bands=bands)
+    text = (
+        f"terraces: {bands.equal:.0%} of neighbouring heights are equal, in "
+        f"{bands.levels.size} bands of {bands.width:.3g} um; statistics are those of a "
+        "surface drawn between them"
     )
-    raise TypeError(msg)
+    holes = np.where(np.isfinite(heights), drawn.surface.heights, np.nan)
+    return text, HeightMap(holes, drawn.surface.spacing)
+
+
+def _with_offsets_named(found: SurfaceStatistics, surface: MapLike) -> SurfaceStatistics:
+    """Say that scan lines are offset, which passes for slopes across them."""
+    from data_io.mending.scan_lines import line_offsets
+
+    heights = real_array("heights", surface.heights)
+    for name, lines in (("rows", heights), ("columns", heights.T)):
+        offsets = line_offsets(lines)
+        if offsets is not None:
+            text = (
+                f"{name} are offset from each other by {np.std(offsets):.3g} um rms, which "
+                "the slope across them holds: mend the map (data_io.mend_map)"
+            )
+            return replace(found, warnings=(text, *found.warnings), reliable=False)
+    return found
+
+
+def _with_slopes(
+    found: SurfaceStatistics, surface: ProfileLike | MapLike, slope: Array, degree: int
+) -> SurfaceStatistics:
+    """Return statistics of a profile of slopes, whose rms is measured and not derived."""
+    from types import SimpleNamespace
+
+    measured = SimpleNamespace(x=surface.x, z=slope)  # type: ignore[union-attr]
+    rms = _statistics(measured, max(degree - 1, -1), "mean", None).height_rms
+    axes = tuple(replace(one, slope_rms=rms) for one in found.axes)
+    return replace(found, slope_rms=rms, axes=axes)
+
+
+def _statistics(
+    surface: ProfileLike | MapLike, degree: int, form: str, quantisation: float | None
+) -> SurfaceStatistics:
+    if _is_map(surface):
+        return _map_statistics(surface, degree, form, quantisation)
+    return _profile_statistics(surface, degree, form, quantisation)  # type: ignore[arg-type]
 
 
 def _profile_statistics(
@@ -152,6 +241,9 @@ def _profile_statistics(
     x, z = x[known], z[known]
     _check_heights(z, degree)
     residual, removed = remove_form_profile(x, z, degree)
+    if is_flat(residual, z):
+        step = float((x[-1] - x[0]) / (x.size - 1))
+        return flat_statistics("profile", residual, (step,), form)
     sampling = profile_sampling(x, residual)
     step = _step(z, quantisation, sampling)
     starts = np.linspace(x[0], x[-1], 65)[:-1, None]
@@ -177,6 +269,8 @@ def _map_statistics(
     spacing = (float(dx), float(dy))
     _check_heights(heights[~np.isnan(heights)], degree)
     residual, removed = remove_form_map(heights, spacing, degree)
+    if is_flat(residual, heights):
+        return flat_statistics("map", residual, spacing, form)
     lines = (residual.T, residual)
     samplings = [line_sampling(lines[i], spacing[i]) for i in (0, 1)]
     step = _step(heights, quantisation, samplings[0])

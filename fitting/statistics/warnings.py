@@ -142,7 +142,15 @@ def _map(found: Findings) -> list[str]:
     texts = []
     if found.anisotropy is not None and found.anisotropy.p_value < 0.05:
         ratio, angle = found.anisotropy.ratio.value, found.anisotropy.direction.value
-        if ratio > 1.1:
+        slopes = sorted(axis.slope_rms.value for axis in found.axes)
+        along_axis = min(abs(angle), np.pi / 2 - abs(angle)) < np.pi / 12
+        if along_axis and ratio > 2 * slopes[-1] / max(slopes[0], 1e-300):
+            texts.append(
+                f"differences between neighbouring lines are {ratio:.3g} times those along "
+                f"them, the slopes only {slopes[-1] / slopes[0]:.3g}: lines are offset, or "
+                "noise differs between them"
+            )
+        elif ratio > 1.1:
             texts.append(
                 f"anisotropic: slopes {ratio:.3g} times larger across the texture, which "
                 f"runs at {np.rad2deg(angle):.0f} degrees from +x"
