@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from fitting.result.fit_result import FitResult
 
-__all__ = ["write_fit"]
+__all__ = ["calibrated", "write_fit"]
 
 
 def write_fit(
@@ -115,13 +115,13 @@ def _cuts(
             if len(np.unique(azimuths)) > 1:
                 name += f"_phi{np.rad2deg(azimuth):.4g}"
             here = np.flatnonzero((waves == wave) & (azimuths == azimuth))
-            yield name, key, _calibrated(result, label, wave, plane.isel(geometry=here))
+            yield name, key, calibrated(result, label, wave, plane.isel(geometry=here))
 
 
-def _calibrated(
+def calibrated(
     result: "FitResult", label: str, wave: float, scan: "xr.Dataset"
 ) -> "xr.Dataset":
-    """Return the readings in the units of the model, without scale and background."""
+    """Return readings in the units of the model, without fitted scale and background."""
     number = f"{wave:.9g}"
 
     def of(name: str, default: float) -> float:

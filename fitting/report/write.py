@@ -10,6 +10,7 @@ import data_io
 from fitting.estimate import Estimate
 from fitting.report import html
 from fitting.report.figures import histogram_figure, scan_figure
+from fitting.report.fit_files import calibrated
 from fitting.result.misfit import RULE
 from pbrdf import __version__
 
@@ -46,7 +47,7 @@ def write_report(
     figures = {
         "surface.png": html.png(histogram_figure(_histograms(result))),
         "scan.png": html.png(
-            scan_figure(data_io.in_plane(result.measurement), result.curves)
+            scan_figure(data_io.in_plane(_in_units(result)), result.curves)
         ),
     }
     for name, image in figures.items():
@@ -56,6 +57,12 @@ def write_report(
     times = {**(seconds or {}), **result.seconds}
     page = html.page("Reflectance model", _sections(result, figures, inputs or {}, times))
     (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+def _in_units(result: "PipelineResult") -> xr.Dataset:
+    """Return the scan in the units of the curves; a relative one by its fitted scale."""
+    fit = result.monte_carlo
+    return calibrated(fit, next(iter(fit.models)), float("nan"), result.measurement)
 
 
 def result_dataset(result: "PipelineResult") -> xr.Dataset:

@@ -24,6 +24,8 @@ __all__ = ["HARDLY_APART", "FitResult"]
 
 # Correlation from which two parameters can hardly be told apart
 HARDLY_APART = 0.95
+# Correlation with one that a bound cuts off from which an interval is no longer symmetric
+_TIED = 0.3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -202,7 +204,7 @@ class FitResult:
     def profiles(self) -> "dict[str, LikelihoodProfile]":
         """Likelihood intervals of the parameters that a bound cuts off, by name.
 
-        And of those that can hardly be told apart from one of them: the bound limits both.
+        And of those that are correlated with one of them: the bound limits both.
         """
         from fitting.result.likelihood import profile_likelihood
 
@@ -211,7 +213,7 @@ class FitResult:
         parameters = self.problem.objective.parameters
         cut = np.array([self._near_bound(parameter) for parameter in parameters])
         # nan, for undetermined ones, compares false
-        tied = (np.abs(self.correlation[:, cut]) > HARDLY_APART).any(axis=1)
+        tied = (np.abs(self.correlation[:, cut]) > _TIED).any(axis=1)
         return {
             name: profile_likelihood(self, name)
             for name, profiled in zip(self.names, cut | tied, strict=True)
@@ -275,10 +277,7 @@ class FitResult:
         lines.append(f"  chi2 / dof = {self.chi2:.4g} / {self.dof} ({quality})")
         lines.append(f"  noise: {self.noise}")
         lines.append(f"  misfit: {self.misfit}")
-        groups = self.misfit.groups if len(self.misfit.groups) > 1 else ()
-        for scan, wave, one in groups:
-            where = f"{scan}, {wave:.9g} um" if np.isfinite(wave) else scan
-            lines.append(f"    {where}: {one}")
+        lines += [f"    {line}" for line in self.misfit.lines]
         lines += [f"  warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
 

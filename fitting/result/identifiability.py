@@ -28,7 +28,10 @@ def identifiability_warnings(
     """Name parameters that the data do not determine, alone or in combination."""
     labels = problem.layout.labels
     warnings = _at_bounds(problem, solved)
-    warnings += [_up_to_a_factor(problem, solved, gauge) for gauge in problem.gauges]
+    # Of many wavelengths the first stands for all
+    warnings += [_up_to_a_factor(problem, solved, one) for one in problem.gauges[:2]]
+    if len(problem.gauges) > 2:
+        warnings.append(f"the same holds for {len(problem.gauges) - 2} more such groups")
     warnings += _relative_to_what_is_held(problem)
     warnings += _unnamed_wavelengths(problem.observations)
     warnings += _turned_axes(problem, solved)

@@ -30,6 +30,8 @@ RULE = (
     "fair: half within 20 %, 19 in 20 and the brightest within a factor of 2; poor: else"
 )
 _HIDDEN = 3.0
+# Scans and wavelengths that a summary lists
+_SHOWN = 6
 _COLUMNS = (
     "observable", "scan", "wavelength", "theta_i", "theta_s", "dphi", "measured", "model",
     "stderr",
@@ -139,6 +141,23 @@ class Misfit:
             f"{self.worst.model:.4g} fitted); {self.rms_stderr:.2g} standard errors rms, "
             f"{self.worst_stderr:.2g} at worst"
         )
+
+    @property
+    def lines(self) -> list[str]:
+        """A line for each scan and wavelength where there are several, the worst first."""
+        if len(self.groups) < 2:
+            return []
+        order = sorted(
+            self.groups,
+            key=lambda group: (VERDICTS.index(group[2].verdict), group[2].median),
+            reverse=True,
+        )
+        found = [
+            f"{scan}, {wave:.9g} um: {one}" if np.isfinite(wave) else f"{scan}: {one}"
+            for scan, wave, one in order[:_SHOWN]
+        ]
+        rest = len(order) - len(found)
+        return [*found, f"and {rest} more, none worse"] if rest else found
 
     def as_dict(self) -> dict[str, Any]:
         """Return the numbers for a JSON file."""
