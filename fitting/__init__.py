@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from fitting.result.model_comparison import Comparison, FTest, compare, f_test
     from fitting.run import fit
     from fitting.statistics.result import SurfaceStatistics
+    from fitting.statistics.slopes import SlopeDistribution, slope_distribution
     from fitting.statistics.surface import surface_statistics
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "PhysicsError",
     "PipelineResult",
     "SimulatedModel",
+    "SlopeDistribution",
     "SurfaceStatistics",
     "check_scan",
     "compare",
@@ -45,10 +47,12 @@ __all__ = [
     "masks",
     "profile_likelihood",
     "run_pipeline",
+    "slope_distribution",
     "surface_statistics",
 ]
 
 _MODULES = {
+    "statistics.slopes": ("SlopeDistribution", "slope_distribution"),
     "readings.aperture": ("Aperture",),
     "drops.silhouette": ("ContactAngle", "contact_angle"),
     "estimate": ("Estimate",),

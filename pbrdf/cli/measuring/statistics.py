@@ -39,7 +39,9 @@ def command(
     form: options.FormOption = "tilt",
     figure: Annotated[
         Path | None,
-        typer.Option(help="Draw the height and slope histograms here (png, pdf)."),
+        typer.Option(
+            help="Draw surface, mended parts, autocorrelation, spectrum, slopes (png, pdf)."
+        ),
     ] = None,
     as_json: Annotated[
         Path | None,
@@ -65,6 +67,19 @@ def command(
         Path | None,
         typer.Option(help="Draw the edge into the micrograph here (png), to check by eye."),
     ] = None,
+    slopes: Annotated[
+        Path | None,
+        typer.Option(help="Write the slope distribution with its errors here (csv)."),
+    ] = None,
+    cutoff: Annotated[
+        float,
+        typer.Option(
+            "--cutoff-um",
+            min=0.0,
+            max=1e9,
+            help="Shortest wavelength that counts for --slopes; 0: as measured.",
+        ),
+    ] = 0.0,
     force: options.Force = False,
 ) -> None:
     """Print height, correlation length, slope and noise, each with its uncertainty.
@@ -101,11 +116,15 @@ def command(
             with staged_file(as_json, force=force) as stage:
                 stage.write_text(f"{text}\n", encoding="utf-8")
     if figure is not None:
-        from fitting.report.figures import histogram_figure
+        from fitting.report.surface_figure import surface_figure
 
         with staged_file(figure, force=force) as stage:
-            histograms = [found.height_histogram(), found.slope_histogram()]
-            histogram_figure(histograms).savefig(stage, dpi=140)
+            surface_figure(heights, found).savefig(stage, dpi=140)
+    if slopes is not None:
+        from fitting import slope_distribution
+
+        with staged_file(slopes, force=force) as stage:
+            slope_distribution(heights, cutoff=cutoff).to_frame().to_csv(stage, index=False)
     # Standard output then holds the numbers and nothing else
     if str(as_json) != "-":
         typer.echo(str(found))

@@ -1,0 +1,161 @@
+"""What a measured surface looks like, and what was found in it."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fitting.report.figures import COLOURS, new_figure
+from fitting.statistics.slopes import slope_distribution
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fitting.statistics.result import SurfaceStatistics
+
+__all__ = ["surface_figure"]
+
+
+def surface_figure(surface: Any, found: "SurfaceStatistics") -> "Figure":
+    """Draw a surface with its scale, what was mended, and its statistics.
+
+    Six panels: the map (form taken off) with a scale bar, or the profile; what was mended,
+    or the height distribution of a sound surface; autocorrelation with its fit; power
+    spectrum with its model; slope distribution with error bars; slope against cut-off.
+    """
+    figure, axes = new_figure(2, 3, (13.0, 7.4))
+    _draw_surface(axes[0, 0], found)
+    mends = [one for one in getattr(surface, "mends", ()) if one.kind != "terraces"]
+    if mends:
+        _draw_mends(axes[0, 1], surface, mends)
+    else:
+        _draw_heights(axes[0, 1], found)
+    _draw_autocorrelation(axes[0, 2], found)
+    if found.height_rms.value > 0:
+        _draw_spectrum(axes[1, 0], found)
+        _draw_slopes(axes[1, 1], surface)
+        _draw_bands(axes[1, 2], found)
+    return figure
+
+
+def _draw_surface(axis: "Axes", found: "SurfaceStatistics") -> None:
+    residual = found.residual
+    if residual.ndim == 1:
+        x = np.arange(residual.size) * found.spacing[0]
+        axis.plot(x, residual, color=COLOURS[0], linewidth=0.8)
+        axis.set(xlabel="x [um]", ylabel="height without form [um]", title="profile")
+        return
+    size = [n * d for n, d in zip(residual.shape, found.spacing, strict=True)]
+    reach = 3 * max(float(np.nanstd(residual)), 1e-12)
+    image = axis.imshow(
+        residual.T, origin="lower", extent=(0, size[0], 0, size[1]), cmap="cividis",
+        vmin=-reach, vmax=reach, interpolation="none",
+    )  # fmt: skip
+    axis.grid(False)
+    axis.set(xlabel="x [um]", ylabel="y [um]", title=f"heights without form ({found.form})")
+    if axis.figure is not None:
+        axis.figure.colorbar(image, ax=axis, label="um", shrink=0.8)
+    length = _round_length(size[0] / 4)
+    left, low = 0.05 * size[0], 0.06 * size[1]
+    axis.plot([left, left + length], [low, low], color="white", linewidth=3)
+    axis.text(
+        left + length / 2, low + 0.02 * size[1], f"{length:g} um", color="white",
+        ha="center", va="bottom", fontsize="small",
+    )  # fmt: skip
+
+
+def _round_length(length: float) -> float:
+    """Return the nearest length of one digit, 1, 2 or 5, below."""
+    power = 10 ** np.floor(np.log10(length))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= length))
+
+
+def _draw_mends(axis: "Axes", surface: Any, mends: list[Any]) -> None:
+    where = np.zeros(surface.shape)
+    for number, one in enumerate(mends, start=1):
+        where[one.where] = number
+    size = [n * d for n, d in zip(surface.shape, surface.spacing, strict=True)]
+    axis.imshow(
+        where.T, origin="lower", extent=(0, size[0], 0, size[1]), cmap="Greys",
+        vmin=0, vmax=len(mends), interpolation="none",
+    )  # fmt: skip
+    axis.grid(False)
+    names = ", ".join(f"{one.kind} ({one.count})" for one in mends)
+    done = "mended" if all(one.mended for one in mends) else "found"
+    axis.set(xlabel="x [um]", ylabel="y [um]", title=f"{done}: {names}")
+
+
+def _draw_heights(axis: "Axes", found: "SurfaceStatistics") -> None:
+    histogram = found.height_histogram()
+    axis.stairs(histogram.density, histogram.edges, fill=True, color=COLOURS[5], alpha=0.55)
+    x = np.linspace(histogram.edges[0], histogram.edges[-1], 300)
+    axis.plot(x, histogram.gaussian(x), color=COLOURS[1], label="Gaussian")
+    axis.set(xlabel="height [um]", ylabel="density [1/um]", title="heights")
+    axis.legend(frameon=False, fontsize="small")
+
+
+def _draw_autocorrelation(axis: "Axes", found: "SurfaceStatistics") -> None:
+    for colour, one in zip(COLOURS, found.axes, strict=False):
+        curve = one.autocorrelation
+        name = f"{one.axis} measured"
+        axis.plot(curve.lag, curve.measured, ".", color=colour, label=name)
+        axis.plot(curve.lag, curve.fitted, color=colour, label=curve.form)
+    axis.axhline(np.exp(-1), color="grey", linewidth=0.8, linestyle=":")
+    axis.set(xlabel="lag [um]", ylabel="autocorrelation [1]", title="autocorrelation")
+    axis.legend(frameon=False, fontsize="small")
+
+
+def _draw_spectrum(axis: "Axes", found: "SurfaceStatistics") -> None:
+    for colour, one in zip(COLOURS, found.axes, strict=False):
+        # A surface that does not vary along an axis has no spectrum there
+        if one.slope_rms.value == 0:
+            continue
+        spectrum = found.psd(one.axis)
+        axis.loglog(
+            spectrum.frequency[1:], spectrum.psd_1d[1:], color=colour, alpha=0.5,
+            label=f"{one.axis} measured",
+        )  # fmt: skip
+        axis.loglog(spectrum.frequency[1:], spectrum.model[1:], color=colour, label="model")
+        axis.axvline(1 / one.cutoff, color=colour, linewidth=0.8, linestyle=":")
+    axis.set(
+        xlabel="spatial frequency [1/um]", ylabel="one-sided spectrum [um3]",
+        title="spectrum; dotted: what is resolved",
+    )  # fmt: skip
+    axis.legend(frameon=False, fontsize="small")
+
+
+def _draw_slopes(axis: "Axes", surface: Any) -> None:
+    slopes = slope_distribution(surface)
+    middle = (slopes.edges[1:] + slopes.edges[:-1]) / 2
+    for colour, (name, density) in zip(COLOURS, slopes.density.items(), strict=False):
+        axis.errorbar(
+            middle, density, slopes.stderr[name], color=colour, fmt=".", markersize=3,
+            elinewidth=0.8, label=f"along {name}, rms {slopes.rms[name]:.3g}",
+        )  # fmt: skip
+        gauss = np.exp(-0.5 * (middle / max(slopes.rms[name], 1e-12)) ** 2)
+        axis.plot(
+            middle, gauss / (np.sqrt(2 * np.pi) * max(slopes.rms[name], 1e-12)),
+            color=colour, linewidth=0.8,
+        )  # fmt: skip
+    axis.set(xlabel="slope [1]", ylabel="density [1]", title="slopes as measured")
+    axis.legend(frameon=False, fontsize="small")
+
+
+def _draw_bands(axis: "Axes", found: "SurfaceStatistics") -> None:
+    for colour, one in zip(COLOURS, found.axes, strict=False):
+        if one.slope_rms.value == 0:
+            continue
+        bands = found.slope_against_cutoff(axis=one.axis)
+        values = np.array([estimate.value for estimate in bands.slope_rms])
+        low = np.array([estimate.low for estimate in bands.slope_rms])
+        high = np.array([estimate.high for estimate in bands.slope_rms])
+        known = np.isfinite(values) & np.isfinite(high)
+        axis.semilogx(bands.cutoff[known], values[known], color=colour, label=one.axis)
+        axis.fill_between(
+            bands.cutoff[known], low[known], high[known], color=colour, alpha=0.2
+        )
+    axis.set(
+        xlabel="shortest wavelength counted [um]", ylabel="slope rms [1]",
+        title="slope against cut-off",
+    )  # fmt: skip
+    axis.legend(frameon=False, fontsize="small")
