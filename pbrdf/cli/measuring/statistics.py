@@ -116,7 +116,7 @@ def command(
             with staged_file(as_json, force=force) as stage:
                 stage.write_text(f"{text}\n", encoding="utf-8")
     if figure is not None:
-        from fitting.report.surface_figure import surface_figure
+        from fitting.report.surface import surface_figure
 
         with staged_file(figure, force=force) as stage:
             surface_figure(heights, found).savefig(stage, dpi=140)
