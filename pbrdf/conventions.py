@@ -44,6 +44,10 @@ RESULT_VARIABLES: dict[str, Variable] = {
     "albedo_stderr": Variable(
         "1", "standard error of albedo", _BOUNCES
     ),
+    "coherent": Variable(
+        "1", "Mueller reflectance of the mean field, a beam apart from brdf",
+        (*_LIGHT, *_MUELLER[-2:]),
+    ),
     "projected_solid_angle": Variable("sr", "integral of cos(theta_s) over the bin", _BINS),
     "absorbed": Variable("1", "share of the light absorbed", _LIGHT),
     "transmitted": Variable("1", "share of the light transmitted", _LIGHT),

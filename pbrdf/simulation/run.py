@@ -20,6 +20,7 @@ from pbrdf.simulation.plan import Plan, Tally
 from pbrdf.simulation.results import to_dataset
 from pbrdf.simulation.skips import chosen_skips, explanation, mesh_explanation
 from pbrdf.simulation.trace import Target, prepare, trace_sample
+from pbrdf.simulation.waves import check_waves, join_waves
 from pbrdf.surface import FixedSurface, HeightMap, MeshSurface
 from pbrdf.tracer import arguments
 from pbrdf.tracer.field import Field
@@ -58,6 +59,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
     explain: bool = False,
     source_half_angle: float = 0.0,
     fold: bool = False,
+    wave: str | None = None,
 ) -> xr.Dataset:
     """Trace light from the source to the hemisphere and bin it as Mueller BRDF.
 
@@ -108,6 +110,10 @@ def simulate(  # noqa: PLR0913  (the public signature)
         the variance. For scenes that are their own mirror image in the mean only: an
         isotropic random surface on a square grid or a flat one, drops and spheres drawn
         anew for every realisation, and phi_i="uniform".
+    wave : str, optional
+        Let waves do the first bounce by this form of `pbrdf.wave.METHODS`, "auto" say, and
+        add their mean field as `coherent`, a beam apart from the BRDF. For clean isotropic
+        Gaussian surfaces at given wavelengths. Later bounces are those of the rays.
 
     Returns
     -------
@@ -186,7 +192,10 @@ def simulate(  # noqa: PLR0913  (the public signature)
     plans = [plan.at(azimuth) for azimuth in azimuths]
     target = None if target_rel_error is None else arguments.target_error(target_rel_error)
     arguments.check_scene(scene)
-    judged = arguments.judge_surface(scene, angles, waves)
+    if wave is not None:
+        check_waves(scene, wave, waves, stokes, plan.half_angle)
+    # What rays do not see at these wavelengths is no fault where waves do the first bounce
+    judged = arguments.judge_surface(scene, angles, None if wave else waves)
     notes = [*arguments.scene_warnings(scene, drawn), *judged.notes]
     for note in notes:
         warnings.warn(note, AccuracyWarning, stacklevel=2)
@@ -243,7 +252,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
             "warnings": notes,
         },
     )
-    return attach(result, {**judged.numbers, **laid.numbers})
+    result = attach(result, {**judged.numbers, **laid.numbers})
+    return result if wave is None else join_waves(result, scene, wave)
 
 
 def _judge_contaminants(

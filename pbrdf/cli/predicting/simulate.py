@@ -34,6 +34,14 @@ def command(
     explain: Annotated[
         bool, typer.Option("--explain", help="Say what was not computed, and why.")
     ] = False,
+    wave: Annotated[
+        str | None,
+        typer.Option(
+            "--wave",
+            help="Let waves do the first bounce, by this form: auto, order-weighted, ...",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Simulate the Mueller BRDF of a rough surface over the whole hemisphere.
 
@@ -69,6 +77,7 @@ def command(
                 explain=explain,
                 source_half_angle=float(np.deg2rad(source_half_angle)),
                 fold=fold,
+                wave=wave,
             )
         write_result(result, stage)
     for line in result.attrs["explanation"]:
@@ -101,4 +110,6 @@ def budget(result: "xr.Dataset") -> Iterator[str]:
                 here.bounces.values, here.albedo, here.albedo_stderr, strict=True
             )
         )
+        if "coherent" in here:
+            parts.insert(0, f"beam of the mean field {float(here.coherent[0, 0]):.6f}")
         yield f"{np.rad2deg(theta_i):.4g}°  albedo by bounces {albedo}; {', '.join(parts)}"

@@ -1,0 +1,177 @@
+"""Single scattering by waves in place of the first bounce of rays; later bounces stay.
+
+The two count different light: a wave form is single scattering, less what Smith's factor
+hides, and that goes on to the second bounce of the rays. Only scattered light does: later
+bounces are taken by the share that is not in the mean field.
+"""
+
+import numpy as np
+import xarray as xr
+
+from pbrdf.conventions import RESULT_VARIABLES
+from pbrdf.optics.fresnel import specular_mueller
+from pbrdf.scene.scene import Scene
+from pbrdf.surface import GaussianSurface
+from pbrdf.tracer import arguments
+from pbrdf.wave import WaveModel
+from pbrdf.wave.methods import METHODS
+
+__all__ = ["check_waves", "join_waves"]
+
+Array = np.ndarray
+
+# Nodes per axis of a bin: at the least, for a lobe as wide as the bin, and at the most
+FEWEST, PER_WIDTH, MOST = 3, 4, 12
+
+
+def check_waves(
+    scene: Scene, wave: str, waves: Array | None, stokes: str, half_angle: float
+) -> None:
+    """Refuse what the waves do not know, by name."""
+    arguments.one_of("wave", wave, METHODS)
+    if waves is None:
+        msg = "wavelength must be given with wave, got None. Pass it in um."
+        raise ValueError(msg)
+    if stokes != "full":
+        msg = f"stokes must be 'full' with wave, got {stokes!r}. Select elements later."
+        raise ValueError(msg)
+    if half_angle:
+        msg = (
+            f"source_half_angle must be 0 with wave, got {half_angle:g}. Average over "
+            "incidences."
+        )
+        raise ValueError(msg)
+    surface = scene.surface
+    if not isinstance(surface, GaussianSurface) or not surface.isotropic:
+        kind = type(surface).__name__
+        msg = (
+            f"the surface must be an isotropic GaussianSurface with wave, got {kind}. "
+            "Its statistics are what waves see."
+        )
+        raise ValueError(msg)
+    if scene.contaminants:
+        msg = "contaminants must be left out with wave: what lies on a surface is rays."
+        raise ValueError(msg)
+    if any(material.diffuse_albedo for material in scene.materials):
+        msg = (
+            "diffuse_albedo of the substrate must be 0 with wave: its light is in the "
+            "first bounce, which the waves replace."
+        )
+        raise ValueError(msg)
+
+
+def join_waves(result: xr.Dataset, scene: Scene, wave: str) -> xr.Dataset:
+    """Replace the first bounce of a result, and add the mean field as `coherent`.
+
+    The standard error of the first bounce is then that which the form states of itself.
+    """
+    surface, substrate = scene.surface, scene.materials[0]
+    assert isinstance(surface, GaussianSurface)
+    length = np.atleast_1d(np.asarray(surface.corr_length, dtype=np.float64))
+    model = WaveModel(
+        substrate,
+        height_rms=surface.ensemble_height_rms,
+        corr_length=float(length[0]),
+        method=wave,
+    )
+    waves = np.atleast_1d(result.wavelength.values)
+    angles = result.theta_i.values
+    once, error = (np.empty((angles.size, waves.size, *_bins(result), 4, 4)) for _ in "12")
+    beam, share = (
+        np.empty((angles.size, waves.size, 4, 4)),
+        np.empty((angles.size, waves.size)),
+    )
+    for i, theta_i in enumerate(angles):
+        for j, wavelength in enumerate(waves):
+            once[i, j], error[i, j] = _averages(result, model, theta_i, float(wavelength))
+            beam[i, j] = model.coherent(theta_i, wavelength)
+            flat = specular_mueller(np.cos(theta_i), *substrate.index(float(wavelength)))[
+                0, 0
+            ]
+            share[i, j] = min(beam[i, j, 0, 0] / flat, 1.0) if flat else 0.0
+    spectral = "wavelength" in result.dims
+    if not spectral:
+        once, error, beam, share = once[:, 0], error[:, 0], beam[:, 0], share[:, 0]
+    light = ("theta_i", "wavelength") if spectral else ("theta_i",)
+    axes = (*light, "theta_s", "dphi", "stokes_out", "stokes_in")
+    entry = RESULT_VARIABLES["coherent"]
+    coherent = xr.DataArray(
+        beam,
+        dims=(*light, "stokes_out", "stokes_in"),
+        attrs={"units": entry.units, "long_name": entry.long_name},
+    )
+    joined = _replaced(
+        result,
+        xr.DataArray(once, dims=axes),
+        xr.DataArray(error, dims=axes),
+        1.0 - xr.DataArray(share, dims=light),
+    )
+    joined = joined.assign(coherent=coherent).assign_attrs(wave=wave)
+    if not np.isinf(substrate.indices(waves)[0]).any():
+        joined["absorbed"] = _below(joined).assign_attrs(result.absorbed.attrs)
+    return joined
+
+
+def _below(joined: xr.Dataset) -> xr.DataArray:
+    """Share of the light that enters the substrate: what is left of one."""
+    elsewhere = ("truncated", "leaked", "left_sideways", "transmitted")
+    gone = joined.albedo.sum("bounces") + sum(joined[name] for name in elsewhere)
+    beam = joined.coherent.isel(stokes_out=0, stokes_in=0, drop=True)
+    return (1.0 - gone - beam).transpose(*joined.absorbed.dims)
+
+
+def _bins(result: xr.Dataset) -> tuple[int, int]:
+    """Numbers of bins in zenith and azimuth."""
+    return result.sizes["theta_s"], result.sizes["dphi"]
+
+
+def _averages(
+    result: xr.Dataset, model: WaveModel, theta_i: float, wavelength: float
+) -> tuple[Array, Array]:
+    """Averages over the bins, weighted with cos(theta_s), and their stated errors."""
+    n_theta, n_dphi = _bins(result)
+    zenith, turn = 0.5 * np.pi / n_theta, 2 * np.pi / n_dphi
+    heights = model.surface.heights
+    slope = float(model.surface.slopes(np.array([wavelength]))[0])
+    lobe = max(slope, 0.15 * wavelength / heights.corr_length)
+    x, w = np.polynomial.legendre.leggauss(
+        int(np.clip(np.ceil(PER_WIDTH * zenith / lobe), FEWEST, MOST))
+    )
+    theta_s = result.theta_s.values[:, None] + 0.5 * zenith * x
+    dphi = result.dphi.values[:, None] + 0.5 * turn * x
+    weight = w * np.cos(theta_s) * np.sin(theta_s)
+    weight = weight / weight.sum(axis=1, keepdims=True)
+    once = np.empty((n_theta, n_dphi, 4, 4))
+    for row in range(n_theta):
+        values = model.brdf(theta_i, theta_s[row, :, None, None], dphi, wavelength)
+        once[row] = np.einsum("i,idjab,j->dab", weight[row], values, w / 2)
+    stated = model.error_estimate(
+        theta_i, result.theta_s.values[:, None], result.dphi.values, wavelength
+    )
+    return once, np.abs(stated * once[..., 0, 0])[..., None, None] * np.ones((4, 4))
+
+
+def _replaced(
+    result: xr.Dataset, once: xr.DataArray, error: xr.DataArray, scattered: xr.DataArray
+) -> xr.Dataset:
+    """Dataset with another first bounce, and all that is summed from it."""
+    later = [label for label in result.bounces.values if label != "1"]
+    area = result.projected_solid_angle
+    # The form errs in all bins together
+    first = {
+        "brdf": once,
+        "brdf_stderr": error,
+        "albedo": (once[..., 0, 0] * area).sum(["theta_s", "dphi"]),
+        "albedo_stderr": (error[..., 0, 0] * area).sum(["theta_s", "dphi"]),
+    }
+    out = result.copy()
+    for name, ours in first.items():
+        rest = result[name].sel(bounces=later) * scattered
+        same = ours.broadcast_like(rest.isel(bounces=0, drop=True))
+        joined = xr.concat([same.expand_dims(bounces=["1"]), rest], dim="bounces")
+        out[name] = joined.transpose(*result[name].dims).assign_attrs(result[name].attrs)
+    total = out.brdf.sum("bounces")
+    error = np.sqrt((out.brdf_stderr**2).sum("bounces"))
+    out["brdf_total"] = total.assign_attrs(result.brdf_total.attrs)
+    out["brdf_total_stderr"] = error.assign_attrs(result.brdf_total_stderr.attrs)
+    return out

@@ -1,0 +1,103 @@
+"""Waves for the first bounce, rays for the later ones: energy, sums, refusals."""
+
+import pytest
+from numpy.testing import assert_allclose
+
+from pbrdf import (
+    AccuracyWarning,
+    GaussianSurface,
+    HeightMap,
+    Material,
+    Scene,
+    WaveModel,
+    simulate,
+)
+
+SURFACE = GaussianSurface(shape=(128, 128), spacing=0.125, corr_length=1.0, height_rms=0.25)
+GIVEN = {
+    "n_rays": 4000,
+    "realizations": 8,
+    "phi_i": "uniform",
+    "n_theta": 18,
+    "n_dphi": 24,
+}
+
+
+def test_waves_and_later_rays_return_all_light_of_a_mirror() -> None:
+    theta_i = [0.0, 0.5]
+    run = simulate(
+        Scene(SURFACE, Material.mirror()), theta_i, wavelength=1.0, wave="auto", **GIVEN
+    )
+    later = run.albedo.sel(bounces=["2", "3+"]).sum("bounces").values
+    total = run.albedo.sum("bounces").values + run.coherent[:, 0, 0].values
+    assert (later > 0.05).all()
+    assert_allclose(total, 1.0, atol=0.03)
+    seen = (run.brdf_total[..., 0, 0] * run.projected_solid_angle).sum(["theta_s", "dphi"])
+    assert_allclose(seen, run.albedo.sum("bounces"), rtol=1e-12)
+
+
+def test_the_first_bounce_is_the_model_and_the_rest_the_rays() -> None:
+    given = GIVEN | {"wavelength": [0.8, 3.0]}
+    scene = Scene(SURFACE, Material(1.5))
+    waves = simulate(scene, 0.5, wave="order-weighted", **given)
+    # The rays alone warn of the wavelength
+    with pytest.warns(AccuracyWarning) as said:
+        rays = simulate(scene, 0.5, **given)
+    assert len(said) > 1
+    model = WaveModel(
+        Material(1.5),
+        height_rms=SURFACE.ensemble_height_rms,
+        corr_length=1.0,
+        method="order-weighted",
+    )
+    where = {"theta_s": 9, "dphi": 14}
+    bin_centre = waves.theta_s.values[9], waves.dphi.values[14]
+    expected = model.brdf(0.5, *bin_centre, [0.8, 3.0])
+    found = waves.brdf.sel(bounces="1").isel(theta_i=0, **where)
+    assert_allclose(found, expected, atol=0.03 * expected[:, :1, :1].max())
+    beam = model.coherent(0.5, [0.8, 3.0])
+    assert_allclose(waves.coherent.isel(theta_i=0), beam)
+    # Only what leaves the mean field goes on to a second bounce
+    flat = WaveModel(Material(1.5), height_rms=1e-9, corr_length=1.0)
+    scattered = 1 - beam[:, 0, 0] / flat.coherent(0.5, 1.0)[0, 0]
+    second = rays.albedo.sel(bounces="2").values[0] * scattered
+    assert_allclose(waves.albedo.sel(bounces="2").values[0], second, rtol=1e-6)
+    assert scattered[1] < 0.7 < scattered[0]
+    # What is not reflected goes below
+    sum_of_all = waves.absorbed + waves.albedo.sum("bounces") + waves.coherent[..., 0, 0]
+    assert_allclose(sum_of_all, 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("surface", "material", "given", "fault"),
+    [
+        (SURFACE, Material(1.5), {}, "wavelength must be given with wave"),
+        (
+            SURFACE,
+            Material(1.5),
+            {"wavelength": 1.0, "wave": "rice"},
+            "wave must be one of",
+        ),
+        (
+            SURFACE,
+            Material(1.5),
+            {"wavelength": 1.0, "stokes": "linear"},
+            "stokes must be 'full' with wave",
+        ),
+        (
+            SURFACE,
+            Material(1.5, diffuse_albedo=0.5),
+            {"wavelength": 1.0},
+            "diffuse_albedo of the substrate must be 0",
+        ),
+        (
+            HeightMap.flat(size=(1.0, 1.0)),
+            Material(1.5),
+            {"wavelength": 1.0},
+            "must be an isotropic GaussianSurface with wave, got HeightMap",
+        ),
+    ],
+)
+def test_what_waves_do_not_know_is_refused(surface, material, given, fault) -> None:
+    with pytest.raises(ValueError, match=fault):
+        simulate(Scene(surface, material), 0.3, **({"wave": "auto"} | given), n_rays=320)
