@@ -15,9 +15,12 @@ Array = np.ndarray
 
 # What is left of a plane by the rounding of its numbers
 _ROUNDING = 1e-10
-_FEW_LEVELS = 5
+# A surface of two levels may be a wave of steps, or one rounded beyond recognition; more
+# levels are what coarse rounding leaves, which is corrected
+_FEW_LEVELS = 2
 _ONE_STEP = 0.95
 _BLOCKS = 16
+TWO_LEVELS = "they have two levels only"
 
 
 def is_flat(residual: Array, heights: Array) -> bool:
@@ -70,7 +73,7 @@ def discrete_heights(heights: Array) -> str | None:
     tolerance = 1e-6 * float(np.ptp(known))
     levels = 1 + int(np.sum(np.diff(np.sort(known)) > tolerance))
     if levels <= _FEW_LEVELS:
-        return f"they have {levels} levels only"
+        return TWO_LEVELS
     for axis in range(heights.ndim):
         steps = np.abs(np.diff(heights, axis=axis))
         steps = steps[np.isfinite(steps)]
@@ -116,6 +119,8 @@ def without_rounding(found: SurfaceStatistics, reason: str) -> SurfaceStatistics
         axes=axes,
         quantisation=0.0,
         warnings=(text, *found.warnings),
+        # Of a surface rounded to two levels nothing is known
+        reliable=found.reliable and reason != TWO_LEVELS,
     )
 
 

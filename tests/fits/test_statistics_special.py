@@ -43,7 +43,9 @@ def test_a_square_wave_keeps_its_height():
     assert_allclose(found.height_rms.value, 1, rtol=0.01)
     jumps = np.count_nonzero(np.diff(wave))
     assert_allclose(found.slope_rms.value, np.sqrt(4 * jumps / 599), rtol=0.01)
-    assert "2 levels only" in found.warnings[0]
+    assert "two levels only" in found.warnings[0]
+    # It may as well be a surface rounded beyond recognition
+    assert not found.reliable
 
 
 def test_offsets_between_rows_are_named():
