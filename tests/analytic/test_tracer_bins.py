@@ -28,7 +28,7 @@ def test_projected_solid_angle_is_the_integral_of_the_cosine(n_theta, n_dphi):
 @pytest.mark.parametrize(("n_theta", "n_dphi"), [(9, 12), (45, 90)])
 @pytest.mark.parametrize("theta_deg", [[10.0, 60.0], 75.0])
 def test_bins_add_up_to_the_albedo(n_theta, n_dphi, theta_deg):
-    surface = GaussianSurface(shape=(64, 64), spacing=0.5, corr_length=4.0, slope_rms=0.4)
+    surface = GaussianSurface(shape=(80, 80), spacing=0.5, corr_length=4.0, slope_rms=0.4)
     result = simulate(
         Scene(surface, Material(1.3, 0.7)), np.deg2rad(theta_deg), n_rays=2000,
         realizations=8, n_theta=n_theta, n_dphi=n_dphi, phi_i=0.5,

@@ -25,6 +25,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "scan.csv").write_text(SCAN)
     (tmp_path / "scene.toml").write_text(SCENE)
     monkeypatch.chdir(tmp_path)
+    # However slow the machine, progress takes no line among the messages
+    monkeypatch.setattr("pbrdf.cli.progress.EVERY", float("inf"))
     return tmp_path
 
 
