@@ -103,9 +103,23 @@ class WaveModel:
         set_field(self, "psd", psd)
         set_field(self, "method", method)
         set_field(self, "exponent", exponent)
-        # A fault of the surface shows here, not at the first call
+        # A fault shows here, not at the first call. A density may be that of a profile,
+        # which only the methods of profiles read
         method_of(method)
-        _ = self.surface
+        if psd is None:
+            _ = self.surface
+        elif height_rms is not None:
+            self._check_height()
+
+    def _check_height(self) -> None:
+        """Refuse a density that has height_rms neither of a surface nor of a profile."""
+        try:
+            _ = self.surface
+        except ValueError as fault:
+            try:
+                _ = self.profile
+            except ValueError:
+                raise fault from None
 
     @cached_property
     def surface(self) -> Scattering:

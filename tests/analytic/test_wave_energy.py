@@ -116,6 +116,17 @@ def test_statistics_mean_the_same_in_other_words(given) -> None:
     )
 
 
+def test_the_density_of_a_profile_is_for_the_methods_of_profiles() -> None:
+    frequency = np.geomspace(1e-3, 2.5, 200)
+    bell = np.exp(-((np.pi * frequency * 1.2) ** 2))
+    lines = WaveModel(
+        Material(1.5), height_rms=0.1, psd=(frequency, np.sqrt(np.pi) * 0.012 * bell)
+    )
+    assert lines.profile_coherent(0.4, 0.5).shape == (2,)
+    with pytest.raises(ValueError, match="two-sided density of a surface"):
+        lines.coherent(0.4, 0.5)
+
+
 def test_faults_of_the_heights_are_named() -> None:
     glass = Material(1.5)
     frequency = np.geomspace(0.01, 2, 50)

@@ -1,0 +1,218 @@
+"""Physical optics of a given map: no statistics assumed, every wave that leaves it."""
+
+import numpy as np
+import scipy.fft
+import xarray as xr
+
+from pbrdf.analytic.geometry import checked_zenith
+from pbrdf.conventions import RESULT_VARIABLES, STOKES, detector_bins
+from pbrdf.errors import require
+from pbrdf.kernels.wave.modes import fill_tangent_plane
+from pbrdf.optics import library
+from pbrdf.optics.fresnel import specular_mueller
+from pbrdf.optics.materials import Material
+from pbrdf.surface import HeightMap
+
+__all__ = ["map_scattering"]
+
+Array = np.ndarray
+
+# Largest error of a phase q h from waves of one ring sharing q [rad]
+PHASE_STEP = 0.1
+FEWEST_RINGS = 24
+# Neighbouring waves of a faded map share light: the error of a mean over that of as many
+# independent ones, 1 + 2 (4/9 + 1/36) along each axis
+HANN_KINSHIP = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)
+
+
+def map_scattering(
+    height_map: HeightMap,
+    material: Material | str,
+    theta_i: float,
+    *,
+    wavelength: float,
+    phi_i: float = 0.0,
+    n_theta: int = 45,
+    n_dphi: int = 90,
+) -> xr.Dataset:
+    """Mueller BRDF of one map by the Kirchhoff integral, averaged over bins.
+
+    A transform of exp(-iqh) for each ring of exit angles gives the waves that leave the
+    map; each carries its power into a bin of the detector.
+
+    Parameters
+    ----------
+    height_map : HeightMap
+        Spacing below half a wavelength. One that is not periodic is faded to its rims.
+    material : Material or str
+        What is below the surface.
+    theta_i, phi_i : float
+        Zenith and azimuth of the source. [rad]
+    wavelength : float
+        Vacuum wavelength. [um]
+    n_theta, n_dphi : int
+        Bins as in `simulate`.
+
+    Returns
+    -------
+    xarray.Dataset
+        `brdf` and `brdf_stderr` [1/sr] (theta_s, dphi, stokes_out, stokes_in) without the
+        specular beam, `coherent` for the beam, `waves`, the number that a bin holds. The
+        error is the scatter of the speckle in the bin; NaN in bins of fewer than two waves.
+        A bin of a map says what this map does: other maps of its kind differ by their
+        speckle.
+
+    Notes
+    -----
+    Tangent plane and single scattering, without shadowing: for maps of gentle slopes whose
+    correlation length exceeds the wavelength.
+    """
+    angle = float(checked_zenith("theta_i", theta_i))
+    wave = one_positive("wavelength", wavelength)
+    substance = material if isinstance(material, Material) else library.get(material)
+    n, kappa = substance.index(wave)
+    steps = np.broadcast_to(np.asarray(height_map.spacing, dtype=np.float64), (2,))
+    if steps.max() >= 0.5 * wave:
+        msg = (
+            f"spacing must be below half the wavelength, {0.5 * wave:.4g} um, got "
+            f"{steps.max():.4g} um. Interpolate the map, or take a longer wavelength."
+        )
+        raise ValueError(msg)
+    heights = np.asarray(height_map.heights, dtype=np.float64)
+    heights = heights - heights.mean()
+    fade = _fade(heights.shape, height_map.periodic)
+    k = 2 * np.pi / wave
+    # Lateral wave vectors over k of the waves that leave: k_s = k_i + K
+    travel = np.array([np.cos(phi_i + np.pi), np.sin(phi_i + np.pi)])
+    grids = [
+        2 * np.pi * scipy.fft.fftfreq(count, step) / k
+        for count, step in zip(heights.shape, steps, strict=True)
+    ]
+    east = grids[0][:, None] + np.sin(angle) * travel[0]
+    north = grids[1][None, :] + np.sin(angle) * travel[1]
+    cosine2 = 1.0 - east**2 - north**2
+    leaving = np.argwhere(cosine2 > 1e-6)
+    cosine = np.sqrt(cosine2[tuple(leaving.T)])
+    lateral = np.stack([
+        np.broadcast_to(east, cosine2.shape)[tuple(leaving.T)],
+        np.broadcast_to(north, cosine2.shape)[tuple(leaving.T)],
+    ])  # fmt: skip
+    power, mean = _powers(heights, fade, leaving, cosine, np.cos(angle), k)
+
+    # In the frame of the incident wave
+    turned = np.stack([
+        travel[0] * lateral[0] + travel[1] * lateral[1],
+        travel[0] * lateral[1] - travel[1] * lateral[0],
+    ])  # fmt: skip
+    jones = np.empty((cosine.size, 4), dtype=np.complex128)
+    fill_tangent_plane(angle, turned, n, kappa, jones)
+    # Efficiency (cos_s/cos_i) |2 cos_i b T/q|^2 with b = jones/(cos_s cos_i)
+    rise = cosine + np.cos(angle)
+    factor = 4.0 * power / (rise**2 * cosine * np.cos(angle))
+    matrices = _mueller(jones) * factor[:, None, None]
+    # Each wave stands for (wavelength/side)^2 of projected solid angle
+    matrices /= wave**2 / (heights.size * steps[0] * steps[1])
+    kinship = 1.0 if height_map.periodic else HANN_KINSHIP
+    result = _binned(matrices, turned, cosine, kinship, (n_theta, n_dphi))
+    beam = mean * specular_mueller(np.cos(angle), n, kappa)
+    result["coherent"] = (("stokes_out", "stokes_in"), beam)
+    for name in ("brdf", "brdf_stderr", "coherent"):
+        entry = RESULT_VARIABLES[name]
+        result[name].attrs = {"units": entry.units, "long_name": entry.long_name}
+    return result.assign_coords(theta_i=angle, wavelength=wave)
+
+
+def one_positive(name: str, value: float) -> float:
+    """One positive number."""
+    return float(require(name, value, lambda v: v > 0, "be one positive number [um]", ""))
+
+
+def _fade(shape: tuple[int, ...], periodic: bool) -> Array:
+    """Weights of the map: Hann's window unless it is periodic; mean square 1."""
+    if periodic:
+        return np.ones(shape)
+    axes = [np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2 for n in shape]
+    window = np.outer(*axes)
+    return window / np.sqrt(np.mean(window**2))
+
+
+def _powers(
+    heights: Array, fade: Array, leaving: Array, cosine: Array, cos_i: float, k: float
+) -> tuple[Array, float]:
+    """|T|^2 of every wave that leaves, the mean taken out, and that of the specular beam.
+
+    T is the transform of exp(-iqh) over the area. Waves are taken together in rings of
+    nearly one q.
+    """
+
+    def phases(cos_s: float) -> tuple[Array, complex]:
+        field = np.exp(-1j * k * (cos_s + cos_i) * heights)
+        return field, complex((field * fade).sum() / fade.sum())
+
+    largest = k * np.abs(heights).max()
+    rings = max(int(np.ceil(largest / (2 * PHASE_STEP))), FEWEST_RINGS)
+    which = np.minimum((cosine * rings).astype(int), rings - 1)
+    power = np.empty(cosine.size)
+    for ring in np.unique(which):
+        rows = which == ring
+        field, mean = phases(float(cosine[rows].mean()))
+        spectrum = scipy.fft.fft2((field - mean) * fade, workers=1) / heights.size
+        power[rows] = np.abs(spectrum[tuple(leaving[rows].T)]) ** 2
+    return power, abs(phases(cos_i)[1]) ** 2
+
+
+def _mueller(jones: Array) -> Array:
+    """Mueller matrices of Jones matrices (ss, sp, ps, pp)."""
+    ss, sp, ps, pp = jones.T
+    fields = np.array([[ss, sp], [ps, pp]])
+    pauli = np.array([
+        [[1, 0], [0, 1]], [[1, 0], [0, -1]], [[0, 1], [1, 0]], [[0, 1j], [-1j, 0]],
+    ])  # fmt: skip
+    # I, Q, U, V of E_i E_j*: traces with these matrices, V = 2 Im(E_s E_p*)
+    return 0.5 * np.einsum(
+        "aij,jkn,bkl,iln->nab", pauli, fields, pauli.conj().swapaxes(1, 2), fields.conj(),
+        optimize=True,
+    ).real  # fmt: skip
+
+
+def _binned(
+    matrices: Array,
+    lateral: Array,
+    cosine: Array,
+    kinship: float,
+    bins_asked: tuple[int, int],
+) -> xr.Dataset:
+    """Average the waves of each bin; speckle tells the error, `kinship` times as large."""
+    n_theta, n_dphi = bins_asked
+    theta_s, dphi, area = detector_bins(n_theta, n_dphi)
+    row = np.minimum((np.arccos(cosine) * n_theta / (0.5 * np.pi)).astype(int), n_theta - 1)
+    # The source lies where the light comes from
+    turn = np.arctan2(lateral[1], lateral[0]) + np.pi
+    column = np.rint(turn * n_dphi / (2 * np.pi)).astype(int) % n_dphi
+    bins = row * n_dphi + column
+    size = n_theta * n_dphi
+    count = np.bincount(bins, minlength=size)
+    flat = matrices.reshape(-1, 16)
+    total = np.stack([np.bincount(bins, v, size) for v in flat.T], axis=-1)
+    square = np.stack([np.bincount(bins, v**2, size) for v in flat.T], axis=-1)
+    # Waves are even in projected solid angle: their mean is that of the bin, and does not
+    # have the noise of how many of the lattice fall into it
+    several = np.where(count > 1, count, np.nan)[:, None]
+    mean = total / np.where(count > 0, count, np.nan)[:, None]
+    spread = np.maximum(square / several - mean**2, 0.0) / (several - 1)
+    shape = (n_theta, n_dphi, 4, 4)
+    value = mean.reshape(shape)
+    error = kinship * np.sqrt(spread.reshape(shape))
+    axes = ("theta_s", "dphi", "stokes_out", "stokes_in")
+    return xr.Dataset(
+        {
+            "brdf": (axes, value),
+            "brdf_stderr": (axes, error),
+            "waves": (axes[:2], count.reshape(shape[:2])),
+            "projected_solid_angle": (axes[:2], area),
+        },
+        {
+            "theta_s": theta_s, "dphi": dphi,
+            "stokes_out": list(STOKES), "stokes_in": list(STOKES),
+        },
+    )  # fmt: skip
