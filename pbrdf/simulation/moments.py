@@ -15,18 +15,24 @@ from pbrdf.kernels.bins.moments import Running, add_sample, fold_lit, fold_sampl
 from pbrdf.kernels.paths import shading
 from pbrdf.kernels.paths.path_buffer import OVERFLOWED
 from pbrdf.kernels.paths.spectra import Room, add_spectrum
+from pbrdf.simulation.balance import Balance
 from pbrdf.simulation.plan import Plan, Tally
+from pbrdf.simulation.single_bounce import SingleBounce
 
 # Wavelengths that one thread adds at a time, and parts of the spectrum at most
 PER_PART, MOST_PARTS = 4, 16
 
 
 class Moments:
-    """Mean and standard error over samples, added in a fixed order."""
+    """Mean and standard error over samples, added in a fixed order.
 
-    def __init__(self, plan: Plan) -> None:
+    With single bounces that do not come from the rays, `single` tells of them.
+    """
+
+    def __init__(self, plan: Plan, single: SingleBounce | None = None) -> None:
         shape = plan.tally_shape
         self.plan = plan
+        self.balance = None if single is None else Balance(single, shape)
         self.samples = 0
         self.reports: tuple[Mapping[str, Any], ...] = ()
         self.notes: dict[str, None] = {}
@@ -68,6 +74,8 @@ class Moments:
                 continue
             if self.plan.fold:
                 fold_sample(tally.flux[a], tally.lit[a])
+            if self.balance is not None:
+                self.balance.add(a, tally, self.plan.n_rays, self._mean[a])
             add_sample(_by_bin(tally.flux[a]), self._matrix, running)
         self._albedo.append(albedo)
         self._energy.append(tally.energy / counted[:, None, None])
@@ -101,7 +109,11 @@ class Moments:
             one[..., order] = _or_else(one[..., order], one[..., order - 1])
         for order in reversed(range(one.shape[2] - 1)):
             one[..., order] = _or_else(one[..., order], one[..., order + 1])
-        return _or_else(one, 1.0 / (self.plan.n_rays * self.samples))
+        one = _or_else(one, 1.0 / (self.plan.n_rays * self.samples))
+        if self.balance is not None:
+            # What comes without rays is known where no ray came, too
+            one[..., : self.balance.known] = 0.0
+        return one
 
     def _by_class(self) -> np.ndarray:
         """Count escaped paths (angles, 1, bounces)."""
@@ -138,6 +150,8 @@ class Moments:
 
         Their arrays are those of the moments, which are used up.
         """
+        if self.balance is not None:
+            self.balance.settle(self._mean, self._scatter, self._scatter_total)
         total = self._mean.sum(axis=2)
         self._estimate(self._mean, self._scatter, self._one_path())
         self._estimate(total, self._scatter_total, self._one_of_all())
@@ -149,6 +163,8 @@ class Moments:
         Where no path came there is no spread, but the error of one path.
         """
         values = np.array(self._albedo)
+        if self.balance is not None:
+            values = self.balance.albedo(values)
         if self.samples < 2:
             return values.mean(axis=0), np.full(values.shape[1:], np.nan)
         spread = values.std(axis=0, ddof=1) / np.sqrt(self.samples)
@@ -156,7 +172,10 @@ class Moments:
 
     def energy(self) -> np.ndarray:
         """Mean energy by fate (angles, wavelengths, 4)."""
-        return np.mean(self._energy, axis=0)
+        energy: np.ndarray = np.mean(self._energy, axis=0)
+        if self.balance is not None:
+            energy = self.balance.energy(energy, self.albedo()[0])
+        return energy
 
     def rel_error(self) -> float:
         """Largest standard error over M00 of the bins above a tenth of the peak.
@@ -164,7 +183,11 @@ class Moments:
         Infinite where nothing was seen but might have been.
         """
         m00 = (..., slice(1), slice(1))
-        mean, scatter = self._mean[m00].sum(axis=2), self._scatter_total[m00].copy()
+        mean, scatter = self._mean[m00], self._scatter_total[m00].copy()
+        if self.balance is not None and self.samples > 1:
+            mean = mean.copy()
+            self.balance.settle(mean, self._scatter[m00].copy(), scatter)
+        mean = mean.sum(axis=2)
         self._estimate(mean, scatter, self._one_of_all())
         bright = mean > 0.1 * mean.max(axis=(2, 3), keepdims=True)
         if not bright.any():

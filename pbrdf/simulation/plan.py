@@ -105,13 +105,16 @@ class Tally:
     absorbed, truncated, leaked and lost sideways; `counts` (angles, N_COUNTS) as in
     `pbrdf.kernels.paths.shading`; `reports` and `notes` tell of contaminants. Where the
     plan has a spectrum, `spectra` holds the light of each direction before it is shaded,
-    and the flux means nothing but where one has overflowed into it.
+    and the flux means nothing but where one has overflowed into it. `single` (angles,
+    n_theta, n_dphi) is the flux of single bounces if facets reflected all, where it did not
+    come from the rays.
     """
 
     flux: np.ndarray
     lit: np.ndarray
     energy: np.ndarray
     counts: np.ndarray
+    single: np.ndarray
     spectra: tuple[Spectra, ...] = ()
     reports: tuple[Mapping[str, Any], ...] = ()
     notes: tuple[str, ...] = ()
@@ -130,6 +133,7 @@ class Tally:
             lit=np.zeros((angles, *by_bounces), dtype=bool),
             energy=np.zeros((angles, wavelengths, shading.N_ENERGIES)),
             counts=np.zeros((angles, shading.N_COUNTS), dtype=np.int64),
+            single=np.full((angles, *by_bounces[1:]), np.nan),
         )
 
     def emptied(self) -> "Tally":

@@ -112,7 +112,7 @@ class GaussianSurface:
         lx, ly = self._lengths
         return bool(lx == ly)
 
-    def _correlation(self, axis: int) -> np.ndarray:
+    def correlation(self, axis: int) -> np.ndarray:
         """Autocorrelation along one axis at the lags of the grid, made periodic."""
         n, step, length = self.shape[axis], self._steps[axis], self._lengths[axis]
         lags = np.arange(n) * step
@@ -132,7 +132,7 @@ class GaussianSurface:
         """Rms forward difference at unit rms height, from 2 (C(0) - C(1)) / step²."""
         n, step, length = self.shape[axis], self._steps[axis], self._lengths[axis]
         # The images of the periodic autocorrelation matter below 6 correlation lengths only
-        periodic = self._correlation(axis)
+        periodic = self.correlation(axis)
         drop = 1.0 - periodic[1]
         if n * step > 12 * length:
             drop = -np.expm1(-((step / length) ** 2))
@@ -159,8 +159,8 @@ class GaussianSurface:
 
         Its columns end where no wave along y passes any more, at a power of 1e-14.
         """
-        along_x = scipy.fft.fft(self._correlation(0)).real
-        along_y = scipy.fft.rfft(self._correlation(1)).real
+        along_x = scipy.fft.fft(self.correlation(0)).real
+        along_y = scipy.fft.rfft(self.correlation(1)).real
         amplitude_x = np.sqrt(np.maximum(along_x, 0.0))
         amplitude_y = np.sqrt(np.maximum(along_y, 0.0))
         passed = np.flatnonzero(amplitude_y > STOPPED * amplitude_y.max())[-1] + 1

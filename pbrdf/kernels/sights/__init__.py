@@ -1,0 +1,1 @@
+"""Kernels for facets of given slopes on a random surface: light, and what hides it."""

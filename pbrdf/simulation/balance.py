@@ -1,0 +1,143 @@
+"""Further bounces brought into balance with single bounces that do not come from rays."""
+
+import numpy as np
+
+from pbrdf.kernels.paths.shading import ABSORBED, LEAKED, N_ORDERS, TRUNCATED
+from pbrdf.simulation.plan import Tally
+from pbrdf.simulation.single_bounce import SingleBounce
+
+
+class Balance:
+    """One azimuth: how much light leaves after one bounce, from looks and from rays.
+
+    All light leaves after one bounce or goes on. Of the first share N₁ there are two
+    estimates, by looks and by rays; with X the excess of the second, N₁ = rays - c X, where
+    c makes the variance least. Further bounces are multiplied by (1 - N₁)/(1 - rays), and
+    single bounces take what is left in proportion to what is hidden of them, so that no
+    light is lost. These are ratio estimators with their usual linearised errors (Cochran,
+    Sampling Techniques, 3rd ed., chapter 6): as if each realisation added its own part of
+    X, spread over bins as the mean light is.
+    """
+
+    def __init__(self, single: SingleBounce, shape: tuple[int, ...]) -> None:
+        # Classes of bounces of which no ray need tell: where nothing is hidden, of all
+        self.known = shape[2] if single.everything else 1
+        self._hidden, self._looks = single.hidden(), single.looks()
+        # By sample: share of the rays that went on, and excess of the rays' single bounces
+        self._beyond: list[np.ndarray] = []
+        self._excess: list[np.ndarray] = []
+        self._unit = np.zeros((shape[0], *shape[3:5]))
+        # Covariance sums of the M00 of bins with X, by bounces and of all together
+        self._cross = np.zeros(shape[:-2])
+        self._cross_total = np.zeros(shape[:2] + shape[3:5])
+        # Single bounces for a unit of X, all bins together (angles, wavelengths)
+        self._taken = np.zeros(shape[:2])
+
+    def add(self, angle: int, tally: Tally, n_rays: int, mean: np.ndarray) -> None:
+        """Add incident direction `angle` of a sample, before it goes into the mean flux."""
+        if angle == 0:
+            self._beyond.append(np.zeros(len(tally.single)))
+            self._excess.append(np.zeros(len(tally.single)))
+        alone = tally.counts[angle, N_ORDERS] / n_rays
+        self._beyond[-1][angle] = 1.0 - alone
+        self._excess[-1][angle] = alone - tally.single[angle].sum()
+        self._unit[angle] += tally.single[angle]
+        if len(self._excess) > 1:
+            rest = self._excess[-1][angle] - np.mean([one[angle] for one in self._excess])
+            change = tally.flux[angle, ..., 0, 0] / n_rays - mean[..., 0, 0]
+            self._cross[angle] += change * rest
+            self._cross_total[angle] += change.sum(axis=1) * rest
+
+    def _parts(self) -> tuple[np.ndarray, np.ndarray]:
+        """Parts of X that go to further and to single bounces, as factors of their light.
+
+        Further (angles,) and single bounces (angles, n_theta, n_dphi).
+        """
+        beyond, excess = np.array(self._beyond), np.array(self._excess)
+        spread = excess.var(axis=0)
+        shared = ((excess - excess.mean(axis=0)) * -beyond).mean(axis=0)
+        part = np.divide(shared, spread, out=np.ones_like(spread), where=spread > 0.0)
+        part = np.clip(part, 0.0, 1.0)
+        # Where no ray went on all light is in single bounces
+        mean = beyond.mean(axis=0)
+        part[mean == 0.0] = 0.0
+        further = part / np.where(mean > 0.0, mean, 1.0)
+        flux = (self._hidden * self._unit).sum(axis=(1, 2)) / len(excess)
+        single = ((1.0 - part) / np.maximum(flux, 1e-300))[:, None, None] * self._hidden
+        return further, single
+
+    def settle(self, mean: np.ndarray, scatter: np.ndarray, total: np.ndarray) -> None:
+        """Bring the moments (angles, wavelengths, bounces, ...) into balance, in place."""
+        further, single = self._parts()
+        light = mean[..., 0, 0]
+        slope = light * further[:, None, None, None, None]
+        slope[:, :, 0] = light[:, :, 0] * single[:, None]
+        self._taken = slope[:, :, 0].sum(axis=(2, 3))
+        if len(self._excess) > 1:
+            spread = np.var(self._excess, axis=0) * len(self._excess)
+            _adjust(scatter, mean, slope, self._cross, spread)
+            _adjust(total, mean.sum(axis=2), slope.sum(axis=2), self._cross_total, spread)
+            floor = self._floor(mean)
+            scatter[:, :, 0] += floor
+            total += floor
+        excess = np.mean(self._excess, axis=0)
+        factor = 1.0 + excess[:, None, None] * single
+        mean[:, :, 0] *= factor[:, None, :, :, None, None]
+        mean[:, :, 1:] *= (1.0 + excess * further).reshape(-1, *(1,) * (mean.ndim - 1))
+
+    def _floor(self, mean: np.ndarray) -> np.ndarray:
+        """Squares that stand for one hidden facet more than was seen, as scatter sums.
+
+        Smith's rule gives the probability h of a facet to be hidden; what N looks say of it
+        is that of one more, 1 / (N + 1/h), at most h.
+        """
+        samples = len(self._excess)
+        looks = np.maximum(self._looks * samples, 1)
+        more = 1.0 / (looks + 1.0 / np.maximum(self._hidden, 1e-300)) / looks
+        more *= samples * (samples - 1) / np.maximum(1.0 - self._hidden, 1e-3) ** 2
+        squares: np.ndarray = mean[:, :, 0] ** 2 * more[:, None, :, :, None, None]
+        return squares
+
+    def albedo(self, values: np.ndarray) -> np.ndarray:
+        """Albedos (samples, angles, wavelengths, bounces) in balance, after `settle`."""
+        excess = np.array(self._excess)[:, :, None]
+        further, _ = self._parts()
+        values = values.copy()
+        values[..., 1:] += (excess * further[:, None])[..., None] * values[..., 1:].mean(
+            axis=0
+        )
+        values[..., 0] += excess * self._taken
+        return values
+
+    def energy(self, energy: np.ndarray, albedo: np.ndarray) -> np.ndarray:
+        """Energies (angles, wavelengths, fates) in balance with all that is reflected."""
+        energy = energy.copy()
+        further, _ = self._parts()
+        scale = 1.0 + np.mean(self._excess, axis=0) * further
+        for fate in (TRUNCATED, LEAKED):
+            energy[..., fate] *= scale[:, None]
+        rest = 1.0 - albedo.sum(axis=-1) - energy[..., TRUNCATED] - energy[..., LEAKED]
+        # What a mirror absorbs is nothing but rounding
+        energy[..., ABSORBED] = np.where(np.abs(rest) < 1e-14, 0.0, rest)
+        return energy
+
+
+def _adjust(
+    scatter: np.ndarray,
+    mean: np.ndarray,
+    slope: np.ndarray,
+    cross: np.ndarray,
+    spread: np.ndarray,
+) -> None:
+    """Change sums of squares by those of slope times X: M00 exactly.
+
+    The other elements take their part of the noise of M00 in proportion to the light.
+    """
+    each = spread.reshape(-1, *(1,) * (slope.ndim - 1))
+    before = scatter[..., 0, 0]
+    after = np.maximum(before + slope * (2.0 * cross + slope * each), 0.0)
+    kept = np.divide(after, before, out=np.ones_like(after), where=before > 0.0)
+    light = mean[..., :1, :1]
+    part = np.divide(mean, light, out=np.zeros_like(mean), where=light != 0.0) ** 2
+    least = np.minimum(kept, 1.0)[..., None, None] * scatter
+    scatter[:] = np.maximum(scatter + part * (after - before)[..., None, None], least)

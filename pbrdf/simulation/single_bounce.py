@@ -1,0 +1,337 @@
+"""Single bounces over a Gaussian surface, from facets of given slopes instead of rays.
+
+The rays of one realisation meet the facets that happen to be in it; how often facets of
+each slope occur is known exactly. So the light of one bounce is an integral over the known
+slope law, under Smith's height-correlated rule of hiding, times the number of facets seen
+in units of that rule. Only the second factor is sampled, on the realisations that the rays
+of further bounces go through, by facets of fitting slopes put at random places.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbrdf.kernels.paths.shading import N_ESCAPED, N_ORDERS
+from pbrdf.kernels.sights.light import ALL, N_CELL, RISE_THETA, SEEN, SlopeLaw, fill_light
+from pbrdf.kernels.sights.look import Ensemble, Looks, look
+from pbrdf.kernels.sights.rules import rules_from
+from pbrdf.kernels.sights.walk import Mesh, Reach
+from pbrdf.kernels.terrain.heightfield import Terrain
+from pbrdf.scene.scene import Scene
+from pbrdf.simulation.plan import Plan, Tally
+from pbrdf.surface.gaussian import GaussianSurface
+
+# Looks at a facet for each ray of a realisation
+LOOKS_PER_RAY = 0.5
+# Cells of directions are no wider than these parts of a quarter and of a full circle
+LEAST_THETA, LEAST_DPHI = 30, 60
+# Flux below which hiding changes nothing
+NOTHING = 1e-13
+# Bins darker than this part of the brightest get fewer looks, and below this part none:
+# there Smith's rule stands, with an error as large as what it hides
+DARK, DARKEST = 0.1, 1e-5
+# Time of a look at 45 degrees or so, and of what 1 / cos(theta_s) adds to it
+BASE_TIME, GRAZING_TIME = 1.0, 0.15
+# Azimuths over which a spread source is averaged: from so many, doubled up to so many
+FEW_AZIMUTHS, MANY_AZIMUTHS = 8, 256
+
+
+def without_rays(scene: Scene, plans: Sequence[Plan]) -> "list[SingleBounce] | None":
+    """Single bounces of plans over a scene, where they can be had without rays."""
+    surface, plan = scene.surface, plans[0]
+    if (
+        not isinstance(surface, GaussianSurface)
+        or plan.media is not None
+        or plan.base.shape[1] > 0
+        or plan.spectrum is not None
+        or plan.half_angle > 0.0
+    ):
+        return None
+    return [SingleBounce.of(surface, one) for one in plans]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Direction:
+    """Single bounces of one incident direction.
+
+    Attributes
+    ----------
+    light : ndarray, shape (wavelengths, cells, cells, elements)
+        Flux into cells of directions under Smith's rule, of one unit that comes in. [1]
+    cells : ndarray, shape (cells, cells, N_CELL)
+        Flux of facets that reflect all, with and without hiding; see the kernel.
+    counts : ndarray of int, shape (cells, cells)
+        Looks a realisation.
+    """
+
+    light: np.ndarray
+    cells: np.ndarray
+    counts: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class SingleBounce:
+    """Single bounces of the directions of a plan.
+
+    Attributes
+    ----------
+    ensemble : Ensemble
+        The random surface, for the kernel.
+    along_x, along_y : ndarray
+        Its autocorrelation at lags -1, 0, ... of the grid.
+    parts : (int, int)
+        Cells of a bin along theta_s and dphi.
+    directions : tuple of Direction
+    """
+
+    ensemble: Ensemble
+    along_x: np.ndarray
+    along_y: np.ndarray
+    parts: tuple[int, int]
+    directions: tuple[Direction, ...]
+
+    @classmethod
+    def of(cls, surface: GaussianSurface, plan: Plan) -> "SingleBounce":
+        """Integrate over the slope law for every direction and wavelength of a plan."""
+        ensemble = _ensemble(surface)
+        parts = -(-LEAST_THETA // plan.n_theta), -(-LEAST_DPHI // plan.n_dphi)
+        along_x, along_y = (
+            np.concatenate([c[1:2], c, c[:1]])
+            for c in (surface.correlation(0), surface.correlation(1))
+        )
+        directions = tuple(
+            _direction(theta, ensemble.law, plan, parts) for theta in plan.theta_i
+        )
+        return cls(
+            ensemble=ensemble, along_x=along_x, along_y=along_y, parts=parts,
+            directions=directions,
+        )  # fmt: skip
+
+    @property
+    def everything(self) -> bool:
+        """Whether no facet hides another, so that no light is left for further bounces."""
+        seen = [one.cells[..., SEEN].sum() for one in self.directions]
+        return bool(np.abs(1.0 - np.array(seen)).max() < 10 * NOTHING)
+
+    def hidden(self) -> np.ndarray:
+        """Return the share of a bin that Smith's rule hides (angles, n_theta, n_dphi)."""
+        cells = np.array([self._by_bin(one.cells) for one in self.directions])
+        whole = cells[..., ALL]
+        return np.divide(
+            whole - cells[..., SEEN], whole, out=np.zeros_like(whole), where=whole > 0.0
+        )
+
+    def looks(self) -> np.ndarray:
+        """Count the looks a realisation (angles, n_theta, n_dphi)."""
+        return np.array(
+            [self._by_bin(one.counts[..., None])[..., 0] for one in self.directions]
+        )
+
+    def explanation(self) -> list[str]:
+        """Say what the single bounces do without."""
+        if self.everything:
+            return [
+                "Rays and realisations: none. No facet hides another, and single bounces "
+                "are an integral."
+            ]
+        looks = int(self.looks().sum(axis=(1, 2)).mean())
+        return [
+            "Single bounces: not from rays but from the law of the slopes, times the share "
+            "of the facets that is seen in units of Smith's rule, from "
+            f"{looks} looks a realisation and direction."
+        ]
+
+    def _by_bin(self, values: np.ndarray) -> np.ndarray:
+        """Sum cells (cells, cells, ...) over those of each bin."""
+        a, b = self.parts
+        n_theta, n_dphi = values.shape[0] // a, values.shape[1] // b
+        return values.reshape(n_theta, a, n_dphi, b, *values.shape[2:]).sum(axis=(1, 3))
+
+    def add(
+        self,
+        terrain: Terrain | None,
+        plan: Plan,
+        seed: np.random.SeedSequence,
+        tally: Tally,
+    ) -> None:
+        """Put single bounces in the place of those of the rays of a sample.
+
+        `terrain` is that of the realisation, None where nothing hides anything.
+        """
+        streams = np.random.default_rng(seed).integers(
+            2**63, size=len(self.directions), dtype=np.uint64
+        )
+        for a, one in enumerate(self.directions):
+            if terrain is None:
+                tally.counts[a, [N_ESCAPED, N_ORDERS]] = plan.n_rays
+                seen = np.ones(one.counts.shape)
+            else:
+                seen = self._look(terrain, plan, a, streams[a])
+            for w, light in enumerate(one.light):
+                flux = self._by_bin(light * seen[..., None])
+                tally.flux[a, w, 0] = (plan.n_rays * flux).reshape(tally.flux.shape[3:])
+            unit = one.cells[..., SEEN]
+            tally.lit[a, 0] = self._by_bin(unit[..., None])[..., 0] > 0.0
+            tally.single[a] = self._by_bin((unit * seen)[..., None])[..., 0]
+
+    def _look(
+        self, terrain: Terrain, plan: Plan, angle: int, stream: np.uint64
+    ) -> np.ndarray:
+        one = self.directions[angle]
+        seen = np.ones(one.counts.shape)
+        if one.counts.any():
+            looks = Looks(
+                plan.theta_i[angle], plan.phi_i or 0.0, plan.phi_i is None,
+                -np.pi / plan.n_dphi, one.cells, one.counts, stream,
+            )  # fmt: skip
+            look(Mesh(terrain, self.along_x, self.along_y), self.ensemble, looks, seen)
+        return seen
+
+
+def _direction(
+    theta: float, law: SlopeLaw, plan: Plan, parts: tuple[int, int]
+) -> Direction:
+    shape = plan.n_theta * parts[0], plan.n_dphi * parts[1]
+    light, cells = _averaged(theta, law, plan, shape)
+    return Direction(
+        light=light, cells=cells, counts=_counts(cells, plan.n_rays * LOOKS_PER_RAY, parts)
+    )
+
+
+def _averaged(
+    theta: float, law: SlopeLaw, plan: Plan, shape: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Light and cells of one zenith angle, averaged over azimuths if they are spread."""
+
+    def at(phi: Sequence[float] | np.ndarray, cells: np.ndarray) -> np.ndarray:
+        light = np.empty((*shape, len(plan.n), plan.n_stokes**2))
+        fill_light(
+            theta, np.asarray(phi), law, rules_from(-np.pi / plan.n_dphi),
+            np.ascontiguousarray(plan.n[:, 0]), np.ascontiguousarray(plan.kappa[:, 0]),
+            plan.n_stokes, light, cells,
+        )  # fmt: skip
+        return np.ascontiguousarray(np.moveaxis(light, 2, 0))
+
+    cells = np.empty((*shape, N_CELL))
+    if plan.phi_i is not None:
+        return at([plan.phi_i], cells), cells
+    number = FEW_AZIMUTHS
+    light = at(np.arange(number) * (2 * np.pi / number), cells)
+    while number < MANY_AZIMUTHS:
+        # Points between those that are there make a rule of twice as many
+        between = np.empty_like(cells)
+        more = at((np.arange(number) + 0.5) * (2 * np.pi / number), between)
+        change = np.abs(between[..., ALL] - cells[..., ALL]).max()
+        light, number = 0.5 * (light + more), 2 * number
+        cells = np.concatenate(
+            [0.5 * (cells + between)[..., :RISE_THETA], cells[..., RISE_THETA:]], axis=-1
+        )
+        if change < 1e-10 * cells[..., ALL].max():
+            break
+    return light, cells
+
+
+def _counts(cells: np.ndarray, looks: float, parts: tuple[int, int]) -> np.ndarray:
+    """Deal looks to cells so that all bins but dark ones get the same relative error."""
+    whole, seen = cells[..., ALL], cells[..., SEEN]
+    share = np.divide(seen, whole, out=np.ones_like(seen), where=whole > 0.0)
+    spread = np.sqrt((1.0 - share) / np.maximum(share, 1e-300))
+    a, b = parts
+    n_theta, n_dphi = whole.shape[0] // a, whole.shape[1] // b
+    of_bin = seen.reshape(n_theta, a, n_dphi, b).sum(axis=(1, 3))
+    area = np.sin(np.pi * (np.arange(n_theta) + 0.5) / n_theta)[:, None]
+    bright = of_bin / area
+    dim = np.sqrt(np.minimum(1.0, bright / (DARK * max(bright.max(), 1e-300))))
+    per_bin = np.divide(dim, of_bin, out=np.zeros_like(of_bin), where=of_bin > 0.0)
+    # Long ways take long: for the least error in a given time
+    cosine = np.cos((np.arange(len(whole)) + 0.5) * (np.pi / 2 / len(whole)))
+    spread = spread / np.sqrt(BASE_TIME + GRAZING_TIME / cosine)[:, None]
+    weight = spread * seen * np.repeat(np.repeat(per_bin, a, axis=0), b, axis=1)
+    wanted = looks * weight / max(weight.sum(), 1e-300)
+    counts = np.maximum(np.rint(wanted), 1.0).astype(np.int64)
+    counts[whole - seen < NOTHING / whole.size] = 0
+    dark = bright < DARKEST * bright.max()
+    counts[np.repeat(np.repeat(dark, a, axis=0), b, axis=1)] = 0
+    return counts
+
+
+def _ensemble(surface: GaussianSurface) -> Ensemble:
+    """Law of three corners of a facet, exact for the mesh."""
+    pitch = np.broadcast_to(np.asarray(surface.spacing, dtype=float), (2,))
+    height = surface.ensemble_height_rms
+    along_x, along_y = surface.correlation(0), surface.correlation(1)
+    c_x, c_y = along_x[1], along_y[1]
+    # Corners (0, 0), (1, 0), (1, 1) and (0, 0), (0, 1), (1, 1); slopes and their mean
+    step_x, step_y = 1.0 / pitch
+    first, second = np.array([-1.0, 1.0, 0.0]), np.array([0.0, -1.0, 1.0])
+    inverse, regression, remainder = np.empty((2, 3, 3)), np.empty((2, 2)), np.empty(2)
+    stride = max(4, int(np.min(np.broadcast_to(surface.corr_length, 2) / pitch) / 2))
+    half = min(surface.shape) // 2 - 1
+    reaches = np.empty((2, -(-half // stride), 2, 3))
+    slopes = np.empty((2, 2))
+    for k in range(2):
+        one, other = (c_x, c_y) if k == 0 else (c_y, c_x)
+        among = np.array(
+            [[1.0, one, c_x * c_y], [one, 1.0, other], [c_x * c_y, other, 1.0]]
+        )
+        inverse[k] = np.linalg.inv(among)
+        gradients = np.array(
+            [first * step_x, second * step_y]
+            if k == 0
+            else [second * step_x, first * step_y]
+        )
+        mean = np.full(3, 1.0 / 3.0)
+        slopes = gradients @ among @ gradients.T * height**2
+        shared = gradients @ among @ mean * height**2
+        regression[k] = np.linalg.solve(slopes, shared)
+        remainder[k] = np.sqrt(mean @ among @ mean * height**2 - shared @ regression[k])
+        corners = np.linalg.inv(np.vstack([gradients, mean]))
+        # Corner heights for a unit of slope x, slope y or lift
+        for m, change in enumerate(
+            ((1.0, 0.0, regression[k, 0]), (0.0, 1.0, regression[k, 1]), (0.0, 0.0, 1.0))
+        ):
+            factors = inverse[k] @ corners @ change
+            reaches[k, ..., m] = _reach(factors, along_x, along_y, k == 0, stride)
+    (xx, xy), (_, yy) = slopes
+    determinant = xx * yy - xy * xy
+    law = SlopeLaw(
+        yy / determinant, -xy / determinant, xx / determinant,
+        1.0 / (2.0 * np.pi * np.sqrt(determinant)), xx, xy, yy,
+    )  # fmt: skip
+    return Ensemble(
+        law,
+        pitch[0],
+        pitch[1],
+        inverse,
+        regression,
+        remainder,
+        Reach(float(stride), float(half), reaches.max(axis=0)),
+    )
+
+
+def _reach(
+    factors: np.ndarray, along_x: np.ndarray, along_y: np.ndarray, low: bool, stride: int
+) -> np.ndarray:
+    """Largest height and rise of the bending beyond each stride (strides, 2).
+
+    The corners of a facet change by `factors` of the correlation about them.
+    """
+    x_here, y_here = along_x[:, None], along_y[None, :]
+    x_back, y_back = np.roll(x_here, 1), np.roll(y_here, 1)
+    middle = x_back * y_here if low else x_here * y_back
+    change = (
+        factors[0] * x_here * y_here + factors[1] * middle + factors[2] * x_back * y_back
+    )
+    rise = np.abs(np.roll(change, -1, axis=0) - change)
+    rise += np.abs(np.roll(change, -1, axis=1) - change)
+    # A node and its neighbours: one less far than it is
+    steps = [np.minimum(np.arange(n), n - np.arange(n)) for n in change.shape]
+    far = np.maximum(steps[0][:, None], steps[1][None, :]) + 2
+    half = min(change.shape) // 2 - 1
+    return np.array(
+        [
+            [np.abs(change[far >= first]).max(), rise[far >= first].max()]
+            for first in range(0, half, stride)
+        ]
+    )
