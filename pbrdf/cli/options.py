@@ -26,6 +26,8 @@ __all__ = [
     "MendOption",
     "OptionalIndex",
     "Output",
+    "PlannedRays",
+    "PlannedRealizations",
     "Rays",
     "Realizations",
     "Scan",
@@ -189,6 +191,20 @@ Rays = Annotated[
 Realizations = Annotated[
     int, typer.Option(min=1, max=100_000, help="Independent random surfaces.")
 ]
+PlannedRays = Annotated[
+    int | None,
+    typer.Option(
+        "--n-rays", min=1000, max=10**9,
+        help="Rays an incidence and realisation: 100000, or planned for a target error.",
+    ),
+]  # fmt: skip
+PlannedRealizations = Annotated[
+    int | None,
+    typer.Option(
+        "--realizations", min=1, max=100_000,
+        help="Independent random surfaces: 16, or planned for a target error.",
+    ),
+]  # fmt: skip
 Seed = Annotated[int, typer.Option(min=0, help="Makes the run reproducible, bit for bit.")]
 Workers = Annotated[
     int | None, typer.Option(min=1, max=1024, help="Threads; all cores if not given.")

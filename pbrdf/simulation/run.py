@@ -16,6 +16,7 @@ from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.paths.shading import LEAKED, N_LEAKED, N_SIDE, SIDEWAYS, TRUNCATED
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.moments import Moments
+from pbrdf.simulation.pilot import choose
 from pbrdf.simulation.plan import Plan, Tally
 from pbrdf.simulation.results import to_dataset
 from pbrdf.simulation.single_bounce import SingleBounce, without_rays
@@ -38,6 +39,8 @@ from pbrdf.validity import (
 
 # Where paths are cut: on a clean surface, and where transparent bodies may catch light
 MOST_BOUNCES, MOST_EVENTS = 64, 1024
+# Rays an incident direction and realisation, where nobody says how many
+N_RAYS = 100_000
 
 
 def simulate(  # noqa: PLR0913  (the public signature)
@@ -45,8 +48,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
     theta_i: npt.ArrayLike,
     *,
     phi_i: npt.ArrayLike | str = 0.0,
-    n_rays: int = 100_000,
-    realizations: int = 1,
+    n_rays: int | None = None,
+    realizations: int | None = None,
     seed: int | None = 0,
     max_bounces: int | None = None,
     target_rel_error: float | None = None,
@@ -75,11 +78,11 @@ def simulate(  # noqa: PLR0913  (the public signature)
         Azimuth of the source; several add the dimension `phi_i` and share surfaces and
         entry points, so each gives what it would give alone. "uniform" averages over the
         azimuth, as suits an isotropic surface. [rad]
-    n_rays : int
-        Rays an incident direction and realisation.
-    realizations : int
+    n_rays : int, optional
+        Rays an incident direction and realisation, 100 000 if not planned.
+    realizations : int, optional
         Surfaces drawn from a GaussianSurface; a HeightMap is traced with this many times
-        n_rays. With `target_rel_error` it is the least number.
+        n_rays. With `target_rel_error` it is the least number. 1 if not planned.
     seed : int or None
         Makes the run reproducible bit for bit, for any number of workers; None draws one.
     max_bounces : int, optional
@@ -87,7 +90,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
         contaminants, where light may be caught; what they still carry is `truncated`.
     target_rel_error : float, optional
         Add samples until the largest stderr / M00 over the bins above a tenth of the peak
-        falls below this; the dataset says what was reached.
+        falls below this; the dataset says what was reached. Without n_rays and realizations
+        both are planned from a short pilot run, see `pbrdf.simulation.pilot`.
     wavelength : array_like, optional
         Vacuum wavelength, scalar or (wavelengths,); needed by tabulated materials. [um]
     n_theta, n_dphi : int
@@ -97,7 +101,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
     workers : int, optional
         Threads; all cores by default. Does not change the result.
     progress : callable, optional
-        Called with (samples done, samples in all).
+        Called with (samples done, samples in all); towards a target error with as many in
+        all as the error so far asks for.
     skips : bool or names of `pbrdf.simulation.skips.SKIPS`
         What may be left out without changing the result; False sends every ray through
         Embree. The same rays are traced in any case.
@@ -162,8 +167,15 @@ def simulate(  # noqa: PLR0913  (the public signature)
     """
     fixed = not arguments.varies(scene)
     root = arguments.seed_sequence(seed)
-    rays = arguments.count("n_rays", n_rays, arguments.BATCHES)
-    drawn = arguments.count("realizations", realizations, 1)
+    pilot = partial(
+        simulate, scene, theta_i, phi_i=phi_i, max_bounces=max_bounces,
+        wavelength=wavelength, n_theta=n_theta, n_dphi=n_dphi, stokes="unpolarized",
+        workers=workers, skips=skips, source_half_angle=source_half_angle, fold=fold,
+        variance_reduction=variance_reduction,
+    )  # fmt: skip
+    rays, drawn, chosen = _counts(
+        n_rays, realizations, target_rel_error, scene, root, pilot
+    )
     batched = fixed or drawn == 1
     samples = max(arguments.BATCHES, drawn) if batched else drawn
     angles = arguments.zeniths(theta_i)
@@ -264,6 +276,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
             "folded": plan.fold,
             "target_rel_error": np.nan if target is None else target,
             "intersector": _intersector(scene, allowed),
+            "plan": chosen,
             "variance_reduction": "none" if single is None else "single bounces",
             "explanation": _explain(scene, plan, single) if explain else [],
             "contaminants": [str(dict(report)) for report in moments[0].reports],
@@ -272,6 +285,27 @@ def simulate(  # noqa: PLR0913  (the public signature)
     )
     result = attach(result, {**judged.numbers, **laid.numbers})
     return result if wave is None else join_waves(result, scene, wave)
+
+
+def _counts(
+    n_rays: int | None,
+    realizations: int | None,
+    target: float | None,
+    scene: Scene,
+    root: np.random.SeedSequence,
+    pilot: Callable[..., xr.Dataset],
+) -> tuple[int, int, list[str]]:
+    """Rays and realisations as asked for or planned, and what the plan says."""
+    sentences: list[str] = []
+    if target is not None and n_rays is None and realizations is None:
+        choice = choose(pilot, scene, arguments.target_error(target), root)
+        n_rays, realizations = choice.n_rays, choice.realizations
+        sentences = choice.sentences
+    rays = arguments.count(
+        "n_rays", N_RAYS if n_rays is None else n_rays, arguments.BATCHES
+    )
+    drawn = 1 if realizations is None else realizations
+    return rays, arguments.count("realizations", drawn, 1), sentences
 
 
 def _judge_contaminants(

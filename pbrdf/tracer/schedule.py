@@ -28,6 +28,8 @@ def gather(
 
     `add` gets a sample and the `map` of the threads, for work of its own.
     Returns their number: `samples`, or from so many on the first that meets the target.
+    `progress` hears how many are done and how many there will be: towards a target as many
+    as the error so far asks for, which falls with the square root of their number.
     The order of samples, and so the result, is the same for any number of workers.
     """
     limit = samples if target is None else max(samples, MOST_SAMPLES)
@@ -37,12 +39,23 @@ def gather(
     ):
         for done, sample in enumerate(drawn, start=1):
             add(sample, pool.map)
-            if progress is not None:
-                progress(done, limit)
             # One sample alone has no error
-            if target is not None and done >= max(samples, 2) and rel_error() <= target:
+            ready = target is not None and done >= max(samples, 2)
+            error = rel_error() if ready else np.inf
+            if progress is not None:
+                progress(done, _expected(done, error, target, samples, limit))
+            if target is not None and error <= target:
                 return done
     return limit
+
+
+def _expected(
+    done: int, error: float, target: float | None, samples: int, limit: int
+) -> int:
+    """Estimate how many samples there will be, as far as the error so far tells."""
+    if target is None or not np.isfinite(error):
+        return max(samples, done)
+    return max(done, min(limit, int(np.ceil(done * (error / target) ** 2))))
 
 
 def in_order(

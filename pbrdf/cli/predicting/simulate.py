@@ -21,8 +21,8 @@ def command(
     fold: options.Fold = False,
     output: options.Output = None,
     force: options.Force = False,
-    n_rays: options.Rays = 100_000,
-    realizations: options.Realizations = 16,
+    n_rays: options.PlannedRays = None,
+    realizations: options.PlannedRealizations = None,
     target: options.Target = None,
     max_bounces: options.Bounces = None,
     wavelength: options.Wavelengths = None,
@@ -56,6 +56,8 @@ def command(
 
     loaded = pbrdf.load_scene(scene)
     target_file = output or scene.with_suffix(".nc")
+    if target is None or n_rays is not None or realizations is not None:
+        n_rays, realizations = n_rays or 100_000, realizations or 16
     waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
     with staged_file(target_file, force=force) as stage:
         with progress_bar("tracing") as progress:
@@ -80,7 +82,7 @@ def command(
                 wave=wave,
             )
         write_result(result, stage)
-    for line in result.attrs["explanation"]:
+    for line in [*result.attrs["plan"], *result.attrs["explanation"]]:
         typer.echo(line)
     for line in budget(result):
         typer.echo(line)

@@ -1,0 +1,1 @@
+"""Run time against true error, for scenes of every class: `python -m pbrdf.bench`."""
