@@ -25,6 +25,7 @@ from pbrdf.simulation.trace import Target, prepare, trace_sample
 from pbrdf.simulation.waves import check_waves, join_waves
 from pbrdf.surface import FixedSurface, HeightMap, MeshSurface
 from pbrdf.tracer import arguments
+from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.schedule import gather
 from pbrdf.tracer.thin_films import thin_absorber_warnings
@@ -406,8 +407,8 @@ def _trace_realization(
     else:
         target = _realize(scene, plans[0], heights)
         tallies = _trace_fixed(target, plans, spare, rays)
-        field = target if isinstance(target, Field) else target.field
-        terrain = field.terrain
+        assert isinstance(target, (Field, EmbreeField))  # no bodies on it
+        terrain = (target if isinstance(target, Field) else target.field).terrain
     for plan, one, tally in zip(plans, single, tallies, strict=True):
         one.add(terrain, plan, looks, tally)
     return tallies

@@ -9,6 +9,7 @@ of further bounces go through, by facets of fitting slopes put at random places.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -193,42 +194,55 @@ def _direction(
     theta: float, law: SlopeLaw, plan: Plan, parts: tuple[int, int]
 ) -> Direction:
     shape = plan.n_theta * parts[0], plan.n_dphi * parts[1]
-    light, cells = _averaged(theta, law, plan, shape)
+    indices = tuple(zip(plan.n[:, 0].tolist(), plan.kappa[:, 0].tolist(), strict=True))
+    light, cells = _averaged(
+        float(theta), plan.phi_i, law, (plan.n_theta, plan.n_dphi), shape,
+        (indices, plan.n_stokes),
+    )  # fmt: skip
     return Direction(
         light=light, cells=cells, counts=_counts(cells, plan.n_rays * LOOKS_PER_RAY, parts)
     )
 
 
+# Runs that differ in their seeds or rays share their integrals
+@lru_cache(maxsize=32)
 def _averaged(
-    theta: float, law: SlopeLaw, plan: Plan, shape: tuple[int, int]
+    theta: float,
+    phi_i: float | None,
+    law: SlopeLaw,
+    bins: tuple[int, int],
+    shape: tuple[int, int],
+    index: tuple[tuple[tuple[float, float], ...], int],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Light and cells of one zenith angle, averaged over azimuths if they are spread."""
+    (n, kappa), n_stokes = np.array(index[0]).T.copy(), index[1]
+    left = -np.pi / bins[1]
 
     def at(phi: Sequence[float] | np.ndarray, cells: np.ndarray) -> np.ndarray:
-        light = np.empty((*shape, len(plan.n), plan.n_stokes**2))
+        light = np.empty((*shape, len(n), n_stokes**2))
         fill_light(
-            theta, np.asarray(phi), law, rules_from(-np.pi / plan.n_dphi),
-            np.ascontiguousarray(plan.n[:, 0]), np.ascontiguousarray(plan.kappa[:, 0]),
-            plan.n_stokes, light, cells,
+            theta, np.asarray(phi), law, rules_from(left), n, kappa, n_stokes,
+            light, cells,
         )  # fmt: skip
         return np.ascontiguousarray(np.moveaxis(light, 2, 0))
 
     cells = np.empty((*shape, N_CELL))
-    if plan.phi_i is not None:
-        return at([plan.phi_i], cells), cells
-    number = FEW_AZIMUTHS
-    light = at(np.arange(number) * (2 * np.pi / number), cells)
-    while number < MANY_AZIMUTHS:
-        # Points between those that are there make a rule of twice as many
-        between = np.empty_like(cells)
-        more = at((np.arange(number) + 0.5) * (2 * np.pi / number), between)
-        change = np.abs(between[..., ALL] - cells[..., ALL]).max()
-        light, number = 0.5 * (light + more), 2 * number
-        cells = np.concatenate(
-            [0.5 * (cells + between)[..., :RISE_THETA], cells[..., RISE_THETA:]], axis=-1
-        )
-        if change < 1e-10 * cells[..., ALL].max():
-            break
+    if phi_i is not None:
+        light = at([phi_i], cells)
+    else:
+        number = FEW_AZIMUTHS
+        light = at(np.arange(number) * (2 * np.pi / number), cells)
+        change = np.inf
+        while change > 1e-10 * cells[..., ALL].max() and number < MANY_AZIMUTHS:
+            # Points between those that are there make a rule of twice as many
+            between = np.empty_like(cells)
+            more = at((np.arange(number) + 0.5) * (2 * np.pi / number), between)
+            change = np.abs(between[..., ALL] - cells[..., ALL]).max()
+            light, number = 0.5 * (light + more), 2 * number
+            cells[..., :RISE_THETA] += between[..., :RISE_THETA]
+            cells[..., :RISE_THETA] *= 0.5
+    for array in (light, cells):
+        array.setflags(write=False)
     return light, cells
 
 
