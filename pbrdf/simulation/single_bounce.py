@@ -21,6 +21,7 @@ from pbrdf.kernels.sights.walk import Mesh, Reach
 from pbrdf.kernels.terrain.heightfield import Terrain
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.plan import Plan, Tally
+from pbrdf.simulation.spectra import WORTHWHILE
 from pbrdf.surface.gaussian import GaussianSurface
 
 # Looks at a facet for each ray of a realisation
@@ -45,7 +46,7 @@ def without_rays(scene: Scene, plans: Sequence[Plan]) -> "list[SingleBounce] | N
         not isinstance(surface, GaussianSurface)
         or plan.media is not None
         or plan.base.shape[1] > 0
-        or plan.spectrum is not None
+        or len(plan.n) >= WORTHWHILE
         or plan.half_angle > 0.0
     ):
         return None
