@@ -15,7 +15,7 @@ import numpy as np
 
 from pbrdf.kernels.paths.shading import N_ESCAPED, N_ORDERS
 from pbrdf.kernels.sights.light import ALL, N_CELL, RISE_THETA, SEEN, SlopeLaw, fill_light
-from pbrdf.kernels.sights.look import Ensemble, Looks, look
+from pbrdf.kernels.sights.looks import Ensemble, Looks, look
 from pbrdf.kernels.sights.rules import rules_from
 from pbrdf.kernels.sights.walk import Mesh, Reach
 from pbrdf.kernels.terrain.heightfield import Terrain

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from pbrdf import GaussianSurface
 from pbrdf.kernels import jit
-from pbrdf.kernels.sights.look import hold
+from pbrdf.kernels.sights.looks import hold
 from pbrdf.kernels.sights.walk import Mesh, least_lift
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.single_bounce import SingleBounce
