@@ -215,9 +215,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
         fold=arguments.mirrored(fold, scene, phi_i),
     )
     plans = [plan.at(azimuth) for azimuth in azimuths]
-    single: list[SingleBounce] | None = None
-    if variance_reduction and not batched and wave is None:
-        single = without_rays(scene, plans)
+    wanted = variance_reduction and not batched and wave is None
+    single = without_rays(scene, plans, wanted=wanted)
     target = None if target_rel_error is None else arguments.target_error(target_rel_error)
     arguments.check_scene(scene)
     if wave is not None:

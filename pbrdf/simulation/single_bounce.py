@@ -39,11 +39,14 @@ BASE_TIME, GRAZING_TIME = 1.0, 0.15
 FEW_AZIMUTHS, MANY_AZIMUTHS = 8, 256
 
 
-def without_rays(scene: Scene, plans: Sequence[Plan]) -> "list[SingleBounce] | None":
-    """Single bounces of plans over a scene, where they can be had without rays."""
+def without_rays(
+    scene: Scene, plans: Sequence[Plan], *, wanted: bool
+) -> "list[SingleBounce] | None":
+    """Single bounces of plans over a scene, where wanted and to be had without rays."""
     surface, plan = scene.surface, plans[0]
     if (
-        not isinstance(surface, GaussianSurface)
+        not wanted
+        or not isinstance(surface, GaussianSurface)
         or plan.media is not None
         or plan.base.shape[1] > 0
         or len(plan.n) >= WORTHWHILE
