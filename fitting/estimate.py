@@ -50,7 +50,8 @@ class Estimate:
         # Two digits of the error say all there is to say about the value
         digits = _decimals(self.stderr)
         value, stderr = f"{self.value:.{digits}f}", f"{self.stderr:.{digits}f}"
-        return f"{value} ± {stderr} (95 %: {self.low:.3g} .. {self.high:.3g})"
+        low, high = f"{self.low:.{digits}f}", f"{self.high:.{digits}f}"
+        return f"{value} ± {stderr} (95 %: {low} .. {high})"
 
     def as_dict(self) -> dict[str, float]:
         """Give the four numbers by name, for reports and files."""

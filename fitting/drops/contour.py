@@ -7,6 +7,11 @@ from scipy import ndimage
 
 # A baseline leans less than this against the rows. [rad]
 MAX_LEAN = np.deg2rad(20)
+# Pixels of finite size, and grey levels known to a hundredth of the contrast, each for drop
+# and substrate, leave a baseline no better known. [pixels], [blurs]
+OFFSET_FLOOR, LEVEL_ERROR = 0.03, 0.035
+# Narrower than this, against the widest drop, is dust
+LEAST_WIDTH = 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,21 +43,21 @@ class DropContour:
     blur: float
 
 
-def find_drop(grey: np.ndarray, baseline: np.ndarray | None) -> DropContour | None:
-    """Return the largest drop that stands on a straight line, or None."""
+def find_drops(grey: np.ndarray, baseline: np.ndarray | None) -> list[DropContour]:
+    """Return the dark drops that stand on a straight dark line, from left to right."""
     from skimage.filters import threshold_otsu
     from skimage.measure import find_contours
 
     step = max(1, min(grey.shape) // 800)
     few = grey[::step, ::step]
     if np.ptp(few) < 0.02:
-        return None
+        return []
     bright = ndimage.gaussian_filter(few, 1.0) > threshold_otsu(few)
     if bright.all() or not bright.any():
-        return None
+        return []
     low, high = np.median(few[~bright]), np.median(few[bright])
     if high - low < 0.02:
-        return None
+        return []
     light = _light(few, bright, high)
     # A lamp may light only a part of a large picture
     rows, columns = (np.flatnonzero(bright.any(axis=axis)) * step for axis in (1, 0))
@@ -81,10 +86,11 @@ def find_drop(grey: np.ndarray, baseline: np.ndarray | None) -> DropContour | No
         )
         xy = np.stack([contour[:, 1] + left, -(contour[:, 0] + top)], axis=1)
         given = None if baseline is None else np.stack([baseline[:, 1], -baseline[:, 0]], 1)
-        drop = _drop_on_line(xy, normal, contrast, given)
-        if drop is not None:
-            drops.append(drop)
-    return max(drops, key=lambda drop: np.ptp(drop.points[:, 0]), default=None)
+        drops += _drops_on_line(xy, normal, contrast, given)
+    # Dust on the substrate is no second drop
+    widest = max((np.ptp(drop.points[:, 0]) for drop in drops), default=0.0)
+    drops = [drop for drop in drops if np.ptp(drop.points[:, 0]) > LEAST_WIDTH * widest]
+    return sorted(drops, key=lambda drop: drop.baseline[:, 1].mean())
 
 
 def _light(grey: np.ndarray, bright: np.ndarray, high: float) -> np.ndarray:
@@ -105,10 +111,10 @@ def _plane(light: np.ndarray, v: np.ndarray, u: np.ndarray) -> np.ndarray:
     return light[0] + light[1] * u[None, :] + light[2] * v[:, None]
 
 
-def _drop_on_line(
+def _drops_on_line(
     xy: np.ndarray, normal: np.ndarray, contrast: float, given: np.ndarray | None
-) -> DropContour | None:
-    """Find a baseline in one contour, and the bulge over it."""
+) -> list[DropContour]:
+    """Find a baseline in one contour, and the bulges over it."""
     steepness = np.hypot(*normal.T)
     upward = normal[:, 1] > np.cos(MAX_LEAN) * steepness
     candidates = upward.copy()
@@ -119,21 +125,20 @@ def _drop_on_line(
             direction = given[1] - given[0]
             line = (given[0], direction * np.sign(direction[0]) / np.hypot(*direction))
         if line is None:
-            return None
+            return []
         origin, direction = line
         along = (xy - origin) @ direction
         above = (xy - origin) @ np.array([-direction[1], direction[0]])
         flank = upward & (np.abs(above) < 2.5) if given is None else np.abs(above) < 2.5
-        run = _bulge(along, above, flank, normal[:, 1] > 0)
-        if run is not None:
-            return _measure(xy, flank, run, steepness, contrast, given)
-        if given is not None:
-            return None
+        runs = _bulges(along, above, flank, normal[:, 1] > 0)
+        found = [_measure(xy, flank, run, steepness, contrast, given) for run in runs]
+        if runs or given is not None:
+            return [drop for drop in found if drop is not None]
         # The straightest part was not a baseline with a drop on it, so look elsewhere
         candidates &= np.abs(above) > 4
         if np.count_nonzero(candidates) < 40:
-            return None
-    return None
+            return []
+    return []
 
 
 def _straightest_line(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
@@ -166,29 +171,27 @@ def _straightest_line(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     return origin, direction
 
 
-def _bulge(
+def _bulges(
     along: np.ndarray, above: np.ndarray, flank: np.ndarray, bright_above: np.ndarray
-) -> np.ndarray | None:
-    """Return the indices of the highest run between two flanks with brightness over it."""
+) -> list[np.ndarray]:
+    """Return the indices of each high run between two flanks with brightness over it."""
     if np.count_nonzero(flank) < 20:
-        return None
+        return []
     start = int(np.argmax(flank))
     order = np.roll(np.arange(along.size), -start)
     closed = np.hypot(along[0] - along[-1], above[0] - above[-1]) < 1.5
     labels, _ = ndimage.label(~flank[order])
-    best: np.ndarray | None = None
-    best_size = 0.0
+    runs = []
     for box in ndimage.find_objects(labels):
         part = order[box[0]]
         top = int(part[np.argmax(above[part])])
-        height, width = above[top], np.ptp(along[part])
         # The run through the ends of an open contour has no second flank
         open_ended = box[0].stop == order.size and not closed
-        if height < 5 or width < 15 or not bright_above[top] or open_ended:
+        if above[top] < 5 or np.ptp(along[part]) < 15 or not bright_above[top] or open_ended:
             continue
-        if np.median(above[part]) > 0 and height * width > best_size:
-            best, best_size = part, float(height * width)
-    return best
+        if np.median(above[part]) > 0:
+            runs.append(part)
+    return runs
 
 
 def _measure(
@@ -230,7 +233,7 @@ def _measure(
         # Neighbouring points share blur and roughness: one in ten is independent
         count = max(len(ground) / 10, 3)
         lean_stderr = spread / np.sqrt(count) / np.std(ground[:, 0])
-        offset_stderr = spread / np.sqrt(count) + 0.02
+        offset_stderr = spread / np.sqrt(count) + OFFSET_FLOOR + LEVEL_ERROR * blur
     else:
         slope = (given[1, 1] - given[0, 1]) / (given[1, 0] - given[0, 0])
         level = given[0, 1] + slope * (middle - given[0, 0])

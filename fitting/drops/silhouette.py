@@ -8,13 +8,16 @@ import numpy as np
 import numpy.typing as npt
 
 from data_io.micrograph.levels import load_grey
-from fitting.drops.contour import DropContour, find_drop
+from fitting.drops.contour import DropContour, find_drops
+from fitting.drops.refusal import check_shape, why_no_drop
 from fitting.drops.shapes import ShapeFit, fit_arc, fit_laplace
 from fitting.estimate import Estimate
 from pbrdf.errors import DataFileError, require
 
 # Points nearer to the baseline are left out: the blurred corner rounds them. [blurs]
 CORNER_BLURS = 3.0
+# Fewer points say little of three lengths and a Bond number
+LEAST_POINTS = 30
 # A side that Young-Laplace misses by more than this gets the local arc. [pixels]
 MAX_LAPLACE_RMS = 0.35
 
@@ -65,14 +68,31 @@ class ContactAngle:
         """Mean of both sides. [degrees]"""
         return (self.left.value + self.right.value) / 2
 
+    def to_dict(self) -> dict[str, Any]:
+        """Give all numbers but the contour by name, for reports and files."""
+        return {
+            "left_deg": self.left.as_dict(),
+            "right_deg": self.right.as_dict(),
+            "baseline_row_column": self.baseline.tolist(),
+            "lean_deg": self.lean,
+            "base_width_pixels": self.base_width,
+            "height_pixels": self.height,
+            "bond_number": self.bond_number if np.isfinite(self.bond_number) else None,
+            "model": list(self.model),
+            "rms_pixels": list(self.rms),
+            "blur_pixels": self.blur,
+            "warnings": list(self.warnings),
+        }
+
 
 def contact_angle(
     image: str | Path | npt.ArrayLike,
     *,
     baseline: npt.ArrayLike | None = None,
     crop: tuple[int, int, int, int] | None = None,
+    which: int | None = None,
 ) -> ContactAngle:
-    """Measure the contact angles of a back-lit drop on a flat substrate.
+    """Measure the contact angles of a drop on a flat substrate, seen from the side.
 
     The contour is taken at the middle grey level. The baseline is the straight line that
     most of the contour beside the drop lies on. Each side is fitted by the Young-Laplace
@@ -84,12 +104,15 @@ def contact_angle(
     Parameters
     ----------
     image : str, Path or array_like, shape (rows, columns[, 3])
-        Drop and substrate dark on bright ground.
+        Drop and substrate dark on bright ground, or bright on dark.
     baseline : array_like, shape (2, 2), optional
         Row and column of two points of the baseline, if it is not in the silhouette.
         [pixels]
     crop : (top, bottom, left, right), optional
         Part of the picture to use. [pixels]
+    which : int, optional
+        Which of several drops, counted from 1 at the left; the widest if not given, with
+        a warning.
 
     Returns
     -------
@@ -124,12 +147,35 @@ def contact_angle(
             msg = f"baseline must have shape (2, 2), got {given.shape}. {cure}"
             raise ValueError(msg)
         given = given - origin
-    drop = find_drop(grey[top:bottom, left:right], given)
-    if drop is None:
-        problem = "expected a dark drop on a dark straight substrate, found none"
-        cure = "Crop to the drop (crop=), or give two points of its baseline (baseline=)."
-        raise DataFileError(name, problem, cure)
-    return _fit_sides(drop, origin)
+    part = grey[top:bottom, left:right]
+    remarks = []
+    drops = find_drops(part, given)
+    if not drops and (drops := find_drops(part.max() - part, given)):
+        remarks.append("drop and substrate are brighter than the ground")
+    if not drops:
+        raise DataFileError(name, *why_no_drop(part, given))
+    drop, remark = _chosen(drops, which)
+    return _fit_sides(drop, origin, name, remarks + remark)
+
+
+def _chosen(drops: list[DropContour], which: int | None) -> tuple[DropContour, list[str]]:
+    """Return the drop that was asked for, or the widest and that there are others."""
+    if which is not None:
+        if not 1 <= which <= len(drops):
+            msg = (
+                f"which must be 1 to {len(drops)}, got {which}. Drops are counted from the "
+                "left."
+            )
+            raise ValueError(msg)
+        return drops[which - 1], []
+    widths = [np.ptp(drop.points[:, 0]) for drop in drops]
+    widest = int(np.argmax(widths))
+    if len(drops) == 1:
+        return drops[0], []
+    return drops[widest], [
+        f"the picture shows {len(drops)} drops; measured is number {widest + 1} from the "
+        "left, the widest (which= chooses another)"
+    ]
 
 
 def _grey_array(image: npt.ArrayLike) -> np.ndarray:
@@ -159,22 +205,25 @@ def _grey_array(image: npt.ArrayLike) -> np.ndarray:
     return (array - array.min()) / np.ptp(array)
 
 
-def _fit_sides(drop: DropContour, origin: np.ndarray) -> ContactAngle:
+def _fit_sides(
+    drop: DropContour, origin: np.ndarray, name: str | Path, remarks: list[str]
+) -> ContactAngle:
     """Fit both sides and put the result together."""
-    clear = drop.points[drop.points[:, 1] > CORNER_BLURS * drop.blur + 1]
-    if len(clear) < 40:
-        msg = (
-            f"image shows a drop of only {len(clear)} clear contour points, 40 are needed. "
-            "Use a larger picture."
+    clear = drop.points[_clear_of_corners(drop)]
+    if len(clear) < LEAST_POINTS:
+        problem = (
+            f"expected a drop of at least {LEAST_POINTS} contour points clear of the "
+            f"blurred corners, got {len(clear)}"
         )
-        raise ValueError(msg)
+        raise DataFileError(name, problem, "Take the picture closer, or sharper.")
     whole = fit_laplace(_thin(clear))
     apex = int(np.argmax(clear[:, 1]))
     sides = [clear[: apex + 1] * [-1, 1], clear[apex:][::-1]]
     results = [
         _fit_side(side, whole, mirror) for side, mirror in zip(sides, (-1, 1), strict=True)
     ]
-    remarks = []
+    check_shape(name, clear, whole, [(fit, other) for fit, other, _ in results])
+    remarks = list(remarks)
     estimates = []
     for name, (fit, other, _) in zip(("left", "right"), results, strict=True):
         error = np.sqrt(
@@ -231,6 +280,14 @@ def _fit_sides(drop: DropContour, origin: np.ndarray) -> ContactAngle:
         contour=contour,
         warnings=tuple(remarks),
     )
+
+
+def _clear_of_corners(drop: DropContour) -> np.ndarray:
+    """Where the substrate's border, which ends at the contact, is too far to matter."""
+    x, height = drop.points.T
+    ends = min(x[0], x[-1]), max(x[0], x[-1])
+    inside = np.minimum(x - ends[0], ends[1] - x).clip(min=0)
+    return np.hypot(inside, height) > CORNER_BLURS * drop.blur + 1
 
 
 def _model_variance(fit: ShapeFit, other: ShapeFit) -> float:

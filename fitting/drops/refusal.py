@@ -1,0 +1,103 @@
+"""Why a picture gives no contact angle, in the words of who took it."""
+
+from pathlib import Path
+
+import numpy as np
+
+from fitting.drops.contour import find_drops
+from fitting.drops.shapes import ShapeFit
+from pbrdf.errors import DataFileError
+
+# A drop, however uneven, is nearer than this to a Young-Laplace curve: of its whole
+# outline, and of each side with an axis of its own. [of the root of height times width]
+WHOLE_MISFIT = 0.06
+SIDE_MISFIT = 0.025
+# An interval wider than this says nothing. [rad]
+WIDEST = np.deg2rad(60)
+
+_OTHER = (
+    "Crop to the drop (crop=), or give two points of its baseline (baseline=)."
+)
+
+
+def why_no_drop(grey: np.ndarray, baseline: np.ndarray | None) -> tuple[str, str]:
+    """Return what is wrong with a picture in which no drop was found, and the cure."""
+    expected = "expected a drop on a straight substrate, found"
+    if _stands(np.rot90(grey, 2)):
+        cure = "Turn the picture if it is upside down; hanging drops are not measured."
+        where = "above it (a pendant drop, or a picture upside down)"
+        return f"{expected} one with its substrate {where}", cure
+    if (side := _cut_side(grey)) is not None:
+        problem = f"{expected} one cut by the {side} side of the frame"
+        return problem, "Take a picture, or a crop, that shows both contacts."
+    for where, quarters in (("left", 1), ("right", 3)):
+        if _stands(np.rot90(grey, quarters)):
+            problem = f"{expected} one with its substrate on its {where}"
+            return problem, "Turn the picture until the substrate is below the drop."
+    if baseline is not None and _stands(grey):
+        cure = "Check row and column of its two points, or leave baseline= out."
+        return "expected a drop on the given baseline, found none there", cure
+    return f"{expected} none", _OTHER
+
+
+def _stands(grey: np.ndarray) -> bool:
+    """Whether a drop, dark or bright, stands in a picture."""
+    return bool(find_drops(grey, None) or find_drops(grey.max() - grey, None))
+
+
+def _cut_side(grey: np.ndarray) -> str | None:
+    """Return which side of the frame cuts a drop: it becomes a plane of symmetry."""
+    mirrored = grey[:, ::-1]
+    seam = grey.shape[1]
+    for side, pair in (("left", (mirrored, grey)), ("right", (grey, mirrored))):
+        doubled = np.concatenate(pair, axis=1)
+        for tone in (doubled, doubled.max() - doubled):
+            for drop in find_drops(tone, None):
+                left, right = drop.baseline[:, 1]
+                if left < seam - 5 and right > seam + 5:
+                    return side
+    return None
+
+
+def check_shape(
+    name: str | Path,
+    points: np.ndarray,
+    whole: ShapeFit,
+    sides: list[tuple[ShapeFit, ShapeFit]],
+) -> None:
+    """Refuse an outline that is no drop's.
+
+    Parameters
+    ----------
+    name : str or Path
+        Of the picture.
+    points : ndarray, shape (n, 2)
+        Of the outline, along the baseline and above it. [pixels]
+    whole : ShapeFit
+        Young-Laplace curve through all points.
+    sides : list of (ShapeFit, ShapeFit)
+        The curve to trust and the other one, of each side.
+
+    Raises
+    ------
+    DataFileError
+        If no smooth drop comes near the outline, or its angle is none or not known.
+    """
+    scale = float(np.sqrt(np.ptp(points[:, 0]) * points[:, 1].max()))
+    misfit = whole.rms / scale / WHOLE_MISFIT
+    for pair in sides:
+        laplace = next(fit for fit in pair if np.isfinite(fit.bond_number))
+        misfit = max(misfit, (laplace.rms - 0.5) / scale / SIDE_MISFIT)
+    if misfit > 1:
+        problem = (
+            "expected the smooth outline of a drop, found one that misses every drop by "
+            f"{max(whole.rms, *(fit.rms for pair in sides for fit in pair)):.1f} pixels"
+        )
+        raise DataFileError(name, problem, _OTHER)
+    for side, (fit, _) in zip(("left", "right"), sides, strict=True):
+        if not 0 <= fit.angle <= np.pi or 2 * 1.96 * fit.stderr > WIDEST:
+            problem = (
+                f"expected a contact angle of 0 to 180 degrees, got {np.rad2deg(fit.angle):.0f} "
+                f"± {np.rad2deg(fit.stderr):.0f} on the {side}"
+            )
+            raise DataFileError(name, problem, _OTHER)
