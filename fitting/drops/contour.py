@@ -187,9 +187,8 @@ def _bulges(
         top = int(part[np.argmax(above[part])])
         # The run through the ends of an open contour has no second flank
         open_ended = box[0].stop == order.size and not closed
-        if above[top] < 5 or np.ptp(along[part]) < 15 or not bright_above[top] or open_ended:
-            continue
-        if np.median(above[part]) > 0:
+        large = above[top] >= 5 and np.ptp(along[part]) >= 15
+        if large and bright_above[top] and not open_ended and np.median(above[part]) > 0:
             runs.append(part)
     return runs
 

@@ -15,9 +15,7 @@ SIDE_MISFIT = 0.025
 # An interval wider than this says nothing. [rad]
 WIDEST = np.deg2rad(60)
 
-_OTHER = (
-    "Crop to the drop (crop=), or give two points of its baseline (baseline=)."
-)
+_OTHER = "Crop to the drop (crop=), or give two points of its baseline (baseline=)."
 
 
 def why_no_drop(grey: np.ndarray, baseline: np.ndarray | None) -> tuple[str, str]:
@@ -96,8 +94,9 @@ def check_shape(
         raise DataFileError(name, problem, _OTHER)
     for side, (fit, _) in zip(("left", "right"), sides, strict=True):
         if not 0 <= fit.angle <= np.pi or 2 * 1.96 * fit.stderr > WIDEST:
+            angle, error = np.rad2deg([fit.angle, fit.stderr])
             problem = (
-                f"expected a contact angle of 0 to 180 degrees, got {np.rad2deg(fit.angle):.0f} "
-                f"± {np.rad2deg(fit.stderr):.0f} on the {side}"
+                f"expected a contact angle of 0 to 180 degrees, got {angle:.0f} "
+                f"± {error:.0f} on the {side}"
             )
             raise DataFileError(name, problem, _OTHER)

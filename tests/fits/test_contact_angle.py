@@ -156,7 +156,7 @@ def test_given_baseline_and_crop():
     ],
 )
 def test_pictures_without_a_drop_are_refused(image):
-    with pytest.raises(ValueError, match="expected a drop|smooth outline"):
+    with pytest.raises(ValueError, match=r"expected a drop|smooth outline"):
         contact_angle(image)
 
 
