@@ -1,5 +1,7 @@
 """Bundles of rays over one surface sample, from one end of the scan to the other."""
 
+from typing import Any
+
 import numpy as np
 
 from pbrdf.kernels.cones import paths as observe_paths
@@ -9,6 +11,7 @@ from pbrdf.kernels.cones.record import ALL, FORETOLD, GLINTS, N_AXES, Catch
 from pbrdf.kernels.paths import shading
 from pbrdf.observation.look import Sums, forward
 from pbrdf.tracer.field import Field
+from pbrdf.tracer.mesh_field import MeshField
 
 # Largest cone that stands for one sample of the hemisphere [rad]
 WIDEST_SAMPLE = 0.2
@@ -19,8 +22,8 @@ FARTHEST_NEAR = 0.35
 
 
 def send_bundles(
-    surface: Field, sample: Sums, rng: np.random.Generator, kind: int, first: int,
-    *, from_source: bool,
+    surface: Field | MeshField, sample: Sums, rng: np.random.Generator, kind: int,
+    first: int, *, from_source: bool,
 ) -> None:  # fmt: skip
     """Send bundles from each distinct direction of one end to all cones of the other."""
     look = sample.look
@@ -77,8 +80,9 @@ def send_bundles(
             np.zeros(shading.N_COUNTS, dtype=np.int64), np.zeros((4, 4)),
         )  # fmt: skip
         axes = np.empty((len(group), N_AXES))
+        terrain, mesh = on_what(surface)
         observe_paths.trace_bundles(
-            surface.terrain, bundle, targets, axes, record, hits, look.optics, rule, catch
+            terrain, mesh, bundle, targets, axes, record, hits, look.optics, rule, catch
         )
         aside = 0 if look.base.shape[1] > 0 else int(catch.counts[shading.N_SIDE])
         if aside >= look.n_rays:
@@ -105,6 +109,13 @@ def send_bundles(
             sample.valued += look.n_rays
         sample.counts += catch.counts
         sample.bundles += look.n_rays
+
+
+def on_what(surface: Field | MeshField) -> tuple[Any, Any]:
+    """Terrain and mesh for the kernels, of which one is None."""
+    if isinstance(surface, MeshField):
+        return None, surface.facets()
+    return surface.terrain, None
 
 
 def near_misses(

@@ -1,11 +1,16 @@
 """Single reflections of one surface sample: facets asked if they join the cones."""
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from pbrdf.kernels.cones import facets as observe_facets
 from pbrdf.kernels.cones.matrix import Cones, mean_mueller
+from pbrdf.kernels.cones.mesh_facets import show_mesh_facets
 from pbrdf.observation.look import Look, Sums, forward
 from pbrdf.tracer.field import GUARD_HEIGHTS, GUARD_SHARE, Field
+from pbrdf.tracer.mesh_field import MeshField
 
 # Source azimuths a sample at which the facets of an isotropic surface are asked: as many as
 # bring every facet of the right tilt into sight, within these bounds
@@ -24,15 +29,13 @@ DISC_RULE = np.array(
 )
 
 
-def ask_facets(surface: Field, sample: Sums, rng: np.random.Generator) -> None:
+def ask_facets(surface: Field | MeshField, sample: Sums, rng: np.random.Generator) -> None:
     """Add the single mirror reflections of every geometry to the sample."""
-    look, terrain = sample.look, surface.terrain
-    inside = _interior(surface)
-    facets = 2 * (inside[1] - inside[0]) * (inside[3] - inside[2])
-    size = int(np.clip(np.sqrt(facets / FACETS_PER_CELL), 1, MOST_CELLS))
-    bounds = observe_facets.slope_range(terrain, inside)
-    table = observe_facets.sort_facets(terrain, inside, size, *bounds)
-
+    look = sample.look
+    if isinstance(surface, MeshField):
+        facets, largest, show = _mesh_facets(surface)
+    else:
+        facets, largest, show = _map_facets(surface)
     paths = look.estimator == "paths"
     means = np.empty(0) if paths else mean_matrices(look)
     room = np.empty((4, 4))
@@ -40,15 +43,15 @@ def ask_facets(surface: Field, sample: Sums, rng: np.random.Generator) -> None:
     for g in range(look.size):
         azimuths = _azimuths(look, g, rng.random())
         streams = rng.integers(2**63, size=len(azimuths), dtype=np.uint64)
-        points = max(1, -(-look.n_rays // (int(facets) * len(azimuths))))
+        points = max(1, -(-look.n_rays // (facets * len(azimuths))))
         most = max(look.n_rays, LEAST_POINTS) / len(azimuths)
         shown = np.zeros((look.n.shape[1], observe_facets.N_SHOWN))
         matrices = np.zeros((len(look.n) if paths else 0, look.n_stokes, look.n_stokes))
         counts = np.zeros(observe_facets.N_FACET_COUNTS, dtype=np.int64)
         for a, phi_i in enumerate(azimuths):
-            observe_facets.show_facets(
-                terrain, table, size, inside, _cones(look, g, phi_i), points, most,
-                streams[a], look.optics, shown, matrices, counts, room,
+            show(
+                _cones(look, g, phi_i), points, most, streams[a], look.optics, shown,
+                matrices, counts, room,
             )  # fmt: skip
         # Points of unknown visibility are taken to be as bright as the others
         known = 1.0
@@ -67,9 +70,40 @@ def ask_facets(surface: Field, sample: Sums, rng: np.random.Generator) -> None:
         smaller = min(
             omega_i[g] / np.cos(look.theta_i[g]), omega_s[g] / np.cos(look.theta_s[g])
         )
-        one = scale * smaller * strength / (int(facets) * points)
+        one = scale * smaller * strength * largest / points
         sample.one[g, 0] = max(sample.one[g, 0], one)
         sample.facet_counts += counts
+
+
+def _map_facets(surface: Field) -> tuple[int, float, Callable[..., None]]:
+    """Facets of a height map: their number, the largest share of one, how to ask them."""
+    inside = _interior(surface)
+    facets = int(2 * (inside[1] - inside[0]) * (inside[3] - inside[2]))
+    size = int(np.clip(np.sqrt(facets / FACETS_PER_CELL), 1, MOST_CELLS))
+    bounds = observe_facets.slope_range(surface.terrain, inside)
+    table = observe_facets.sort_facets(surface.terrain, inside, size, *bounds)
+    show = partial(observe_facets.show_facets, surface.terrain, table, size, inside)
+    return facets, 1.0 / facets, show
+
+
+def _mesh_facets(surface: MeshField) -> tuple[int, float, Callable[..., None]]:
+    """Tell the same of a mesh; of a sheet without a guard rim."""
+    mesh = surface.surface
+    chosen = np.arange(len(mesh.faces))
+    area = float(np.prod(mesh.size))
+    if mesh.period is None:
+        low, high = mesh.bounds
+        guard = np.minimum(
+            GUARD_HEIGHTS * (high[2] - low[2]), GUARD_SHARE * np.asarray(mesh.size)
+        )
+        middle = mesh.vertices[mesh.faces].mean(axis=1)[:, :2]
+        inner = (middle >= low[:2] + guard) & (middle <= high[:2] - guard)
+        chosen = np.flatnonzero(inner.all(axis=1))
+        # What looks down covers what looks up once more
+        area = float((mesh.areas * mesh.normals[:, 2])[chosen].sum())
+    shares = mesh.areas[chosen] / area
+    show = partial(show_mesh_facets, surface.facets(), chosen, shares)
+    return len(chosen), float(shares.max()), show
 
 
 def _interior(surface: Field) -> np.ndarray:

@@ -7,9 +7,10 @@ from pbrdf.observation.bundles import send_bundles
 from pbrdf.observation.facets import ask_facets
 from pbrdf.observation.look import Look, Sight, Sums
 from pbrdf.tracer.field import Field
+from pbrdf.tracer.mesh_field import MeshField
 
 
-def look_at(surface: Field, look: Look, seed: np.random.SeedSequence) -> Sight:
+def look_at(surface: Field | MeshField, look: Look, seed: np.random.SeedSequence) -> Sight:
     """Look at one surface from every detector; releases the interpreter lock."""
     sample = Sums(look)
     rng = np.random.default_rng(seed)

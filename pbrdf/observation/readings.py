@@ -136,6 +136,7 @@ def to_dataset(
         "brdf_total_stderr": (matrix, stderr[-1]),
         "truncated": (("wavelength",), seen.energy[:, shading.TRUNCATED]),
         "leaked": (("wavelength",), seen.energy[:, shading.LEAKED]),
+        "transmitted": (("wavelength",), seen.energy[:, shading.TRANSMITTED]),
         "left_sideways": (("wavelength",), seen.energy[:, shading.SIDEWAYS]),
     }
     data: dict[str, Any] = {}

@@ -21,9 +21,17 @@ from pbrdf.observation.one_sample import look_at
 from pbrdf.observation.readings import Readings, as_scan, to_dataset
 from pbrdf.scene.scene import Scene
 from pbrdf.scene.write import scene_text
-from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, MeshSurface
+from pbrdf.surface import (
+    FixedSurface,
+    GaussianSurface,
+    HeightMap,
+    MeasuredSurface,
+    MeshSurface,
+    Surface,
+)
 from pbrdf.tracer import arguments
 from pbrdf.tracer.field import Field
+from pbrdf.tracer.mesh_field import MeshField
 from pbrdf.tracer.schedule import gather
 from pbrdf.validity import attach, lost_light_warnings, lost_ray_warnings
 
@@ -48,6 +56,8 @@ SAFE_DECAY = 0.8
 MOST_BOUNCES = 64
 # Narrower cones lose digits [rad]
 NARROW = 1e-4
+# Facets of a mesh that look up less than this are walls
+LEAST_UP = 0.17
 
 
 def observe(  # noqa: PLR0913  (the public signature)
@@ -162,13 +172,13 @@ def observe(  # noqa: PLR0913  (the public signature)
     if len(shape) > 1:
         msg = f"theta_i, theta_s, dphi must be one-dimensional, got shape {shape}."
         raise ValueError(msg)
-    surface, fixed = scene.surface, isinstance(scene.surface, HeightMap)
-    if isinstance(surface, MeshSurface):
+    surface, fixed = scene.surface, isinstance(scene.surface, FixedSurface)
+    if isinstance(surface, MeshSurface) and surface.kind == "bodies" and not surface.period:
         msg = (
-            "scene must stand on heights to be observed, got a MeshSurface. Use simulate "
-            "with source_half_angle and bins as wide as the detector."
+            "surface must have a mean plane to be observed, got bodies that stand alone. "
+            "Give them a period, or use simulate."
         )
-        raise TypeError(msg)
+        raise ValueError(msg)
     root = arguments.seed_sequence(seed)
     rays = arguments.count("n_rays", n_rays, arguments.BATCHES)
     drawn = arguments.count("realizations", realizations, 1)
@@ -225,11 +235,13 @@ def observe(  # noqa: PLR0913  (the public signature)
 
     if batched:
         shared = (
-            surface if isinstance(surface, HeightMap) else surface.sample(root.spawn(1)[0])
+            surface
+            if isinstance(surface, FixedSurface)
+            else surface.sample(root.spawn(1)[0])
         )
-        draw = partial(look_at, Field.of(shared), look)
+        draw = partial(look_at, _ready(shared), look)
     else:
-        assert not isinstance(surface, HeightMap)  # a fixed surface is batched
+        assert not isinstance(surface, FixedSurface)  # a fixed surface is batched
         draw = partial(_look_at_realization, surface, look)
 
     seen = Readings(look)
@@ -282,6 +294,13 @@ def _missing_light(seen: Readings, fates: tuple[str, ...]) -> list[str]:
     return lost_light_warnings(shares, None, seen.look.max_bounces)
 
 
+def _ready(surface: FixedSurface) -> Field | MeshField:
+    """Make a surface ready for tracing."""
+    if isinstance(surface, MeshSurface):
+        return MeshField.of(surface, frozenset(["steep"]))
+    return Field.of(surface)
+
+
 def _look_at_realization(
     surface: GaussianSurface | MeasuredSurface, look: Look, seed: np.random.SeedSequence
 ) -> Sight:
@@ -289,8 +308,14 @@ def _look_at_realization(
     return look_at(Field.of(surface.sample(heights)), look, rays)
 
 
-def _rms_slope(surface: GaussianSurface | MeasuredSurface | HeightMap) -> float:
-    """Rms slope per axis of a surface, or of one realisation."""
+def _rms_slope(surface: Surface) -> float:
+    """Rms slope per axis of a surface, or of one realisation; of a mesh without walls."""
+    if isinstance(surface, MeshSurface):
+        up = surface.normals[:, 2]
+        gentle = up > LEAST_UP
+        seen = (surface.areas * up)[gentle]
+        squares = (1.0 / up[gentle] ** 2 - 1.0) / 2
+        return float(np.sqrt((seen * squares).sum() / seen.sum())) if gentle.any() else 0.0
     sample = surface if isinstance(surface, HeightMap) else surface.sample(0)
     return float(np.sqrt(np.mean([np.mean(slope**2) for slope in sample.slopes()])))
 

@@ -128,9 +128,8 @@ def _read_mesh(table: dict[str, Any], source: Path) -> MeshSurface:
     labels = table.get("labels")
     period = _pair(table["period_um"]) if "period_um" in table else None
     if "file" in table:
-        return MeshSurface(
-            source.parent / table["file"], period, labels, unit=table.get("unit")
-        )
+        file = companion(source, table["file"], "[surface]")
+        return MeshSurface(file, period, labels, unit=table.get("unit"))
     check_present(table, ("faces",), "surface", source)
     arrays = np.asarray(table["vertices_um"]), np.asarray(table["faces"])
     return MeshSurface(arrays, period, labels, unit=table.get("unit"))

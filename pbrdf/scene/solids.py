@@ -11,10 +11,11 @@ from pbrdf.errors import require
 from pbrdf.scene.scene import Scene
 from pbrdf.surface import FixedSurface, HeightMap, MeshSurface
 from pbrdf.surface.mesh.morphologies import turned_body
-from pbrdf.surface.mesh.reading import FORMATS
 
 # Rings of a body of revolution for each facet around it
 RINGS = 0.5
+# Formats of one file, with nothing beside it
+WRITTEN = (".glb", ".stl", ".ply", ".off")
 
 
 def scene_solids(
@@ -80,7 +81,7 @@ def export_scene(
     scene: Scene, path: str | Path, *, seed: int = 0, base: float | None = None,
     sections: int = 48,
 ) -> None:  # fmt: skip
-    """Write a scene as a mesh file: GLB and glTF keep its parts apart, by name.
+    """Write a scene as a mesh file: GLB keeps its parts apart, by name.
 
     Arguments as of `scene_solids`. Numbers are micrometres in every format.
 
@@ -92,9 +93,9 @@ def export_scene(
     import trimesh
 
     target = Path(path)
-    if target.suffix.lower() not in FORMATS:
+    if target.suffix.lower() not in WRITTEN:
         msg = (
-            f"path must end in one of {', '.join(FORMATS)}, got {target.name!r}. "
+            f"path must end in one of {', '.join(WRITTEN)}, got {target.name!r}. "
             "Choose GLB for viewing, STL for printing."
         )
         raise ValueError(msg)

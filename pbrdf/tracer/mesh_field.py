@@ -120,6 +120,7 @@ class MeshField:
         period = surface.period or (np.inf, np.inf)
         frame = kernel.MeshFrame(
             kind=KINDS[surface.kind],
+            crossing=surface.parts > 1,
             periodic=surface.period is not None,
             period_x=period[0],
             period_y=period[1],
@@ -215,11 +216,15 @@ class MeshField:
             array.ctypes.data
             for array in (surface.vertices, surface.faces, normals, self.images)
         ]
-        call = ctypes.cast(library().rtcIntersect1, ctypes.c_void_p).value
+        first, any_one = (
+            ctypes.cast(one, ctypes.c_void_p).value
+            for one in (library().rtcIntersect1, library().rtcOccluded1)
+        )
         return kernel.Facets(
             surface.vertices, surface.faces, normals,
-            NO_LABELS if surface.labels is None else surface.labels, self.frame, call,
-            self.scene, ray.ctypes.data, arguments.ctypes.data, ray, ray.view(np.uint32),
-            self.images, context[AT_QUERY : AT_QUERY + 8 * N_QUERY].view(np.float64),
+            NO_LABELS if surface.labels is None else surface.labels, self.frame,
+            first, any_one, self.scene, ray.ctypes.data, arguments.ctypes.data, ray,
+            ray.view(np.uint32), self.images,
+            context[AT_QUERY : AT_QUERY + 8 * N_QUERY].view(np.float64),
             np.zeros(1, dtype=np.int64),
         )  # fmt: skip

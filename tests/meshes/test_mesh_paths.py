@@ -26,9 +26,9 @@ def mirror(k, n):
 
 def path(mesh, facets, place, k, most=40):
     """Faces of a path as the tracer finds them, its last direction and its fate."""
-    face, faces = -1, []
+    face, delicate, faces = -1, 0, []
     for _ in range(most):
-        fate, face, *place = seek_facet(facets, face, *place, *k)
+        fate, face, delicate, *place = seek_facet(facets, face, delicate, *place, *k)
         if fate != HIT:
             return faces, k, fate
         faces.append(face)
@@ -148,11 +148,11 @@ def test_rays_at_vertices_and_along_edges_are_caught(shape):
             assert normal @ k < 0.0
             for point in target:
                 start = point + k * (top + 0.01 - point[2]) / k[2]
-                fate, face, *place = seek_facet(facets, -1, *start, *k)
+                fate, face, delicate, *place = seek_facet(facets, -1, 0, *start, *k)
                 assert fate == HIT, (fate, point)
                 # And on from there, exactly at the edge
                 out = mirror(k, mesh.normals[face])
-                fate, *_ = seek_facet(facets, face, *place, *out)
+                fate, *_ = seek_facet(facets, face, delicate, *place, *out)
                 assert fate not in (LOST, WRONG), (fate, place)
 
 

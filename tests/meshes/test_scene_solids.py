@@ -71,5 +71,5 @@ def test_a_mesh_is_written_as_it_is(tmp_path):
     assert len(MeshSurface(tmp_path / "again.ply", mesh.period).faces) == len(mesh.faces)
     with pytest.raises(ValueError, match="base must be left out"):
         scene_solids(Scene(mesh, "bk7"), base=1.0)
-    with pytest.raises(ValueError, match=r"path must end in one of .stl"):
+    with pytest.raises(ValueError, match=r"path must end in one of .glb"):
         export_scene(Scene(mesh, "bk7"), tmp_path / "again.step")

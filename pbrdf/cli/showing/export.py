@@ -13,35 +13,53 @@ if TYPE_CHECKING:
 
     from pbrdf import MicrofacetModel
 
+# Formats of meshes
+MESHES = (".glb", ".stl", ".ply")
+
 
 def command(
     source: Annotated[
-        Path, typer.Argument(help="Result (.nc) or model (.toml).", show_default=False)
+        Path,
+        typer.Argument(help="Result (.nc), model or scene (.toml).", show_default=False),
     ],
     output: Annotated[
         Path,
         typer.Option(
             "--output",
             "-o",
-            help=".pbsdf: polarised measured BSDF of Mitsuba 3. .csv: goniometer table.",
+            help=".pbsdf: polarised measured BSDF of Mitsuba 3. .csv: goniometer table. "
+            ".glb, .stl, .ply: mesh of a scene, in micrometres.",
         ),
     ],
     theta_i: options.Incidences = "30,60",
     force: options.Force = False,
     wavelength: options.Wavelength = None,
+    base: Annotated[
+        float | None,
+        typer.Option(
+            "--base-um", help="Close a height map to a block this thick below it, to print."
+        ),
+    ] = None,
+    seed: options.Seed = 0,
 ) -> None:
-    """Write a simulated or fitted BRDF for a renderer, or as a table.
+    """Write a BRDF for a renderer or as a table, or a scene as a mesh.
 
     A table of a model has the incidences of --theta-i-deg and the hemisphere by 5 degrees;
     that of a result has the bins of the result.
+
+    Of a random scene one realisation is written, that of --seed.
 
     Example: pbrdf export model.toml -o vinyl.pbsdf
     """
     import data_io
     from pbrdf.cli.staging import staged_file
 
+    if output.suffix in MESHES:
+        export_mesh(source, output, base, seed, force=force)
+        return
     if output.suffix not in (".pbsdf", ".csv"):
-        msg = f"--output must end in .pbsdf or .csv, got {output.name!r}."
+        known = ", ".join((".pbsdf", ".csv", *MESHES))
+        msg = f"--output must end in one of {known}, got {output.name!r}."
         raise ValueError(msg)
     if source.suffix not in (".nc", ".toml"):
         msg = f"source must be a result (.nc) or a model (.toml), got {source.name!r}."
@@ -82,6 +100,25 @@ def _accuracy_lines(accuracy: "xr.Dataset") -> Iterator[str]:
             for label in here["quantile"].values
         )
         yield f"  M00 {name} of its peak: {shares}"
+
+
+def export_mesh(
+    source: Path, output: Path, base: float | None, seed: int, *, force: bool
+) -> None:
+    """Write one realisation of a scene as a mesh."""
+    from pbrdf import load_scene
+    from pbrdf.cli.staging import staged_file
+    from pbrdf.scene.solids import export_scene
+
+    if source.suffix != ".toml":
+        msg = (
+            f"source must be a scene (.toml) to be written as a mesh, got {source.name!r}."
+        )
+        raise ValueError(msg)
+    scene = load_scene(source)
+    with staged_file(output, force=force) as stage:
+        export_scene(scene, stage, seed=seed, base=base)
+    typer.echo(f"Written: {output}")
 
 
 def model_rows(

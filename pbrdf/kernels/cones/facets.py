@@ -208,10 +208,12 @@ def show_facets(
                 if cosine <= 0.0:
                     continue
                 # Seen from the detector, and through the mirror from the source?
-                fate = leave(terrain, i, j, facet, u, v, z, k_x, k_y, k_z, cosine / n_z)[0]
+                fate = leave(
+                    terrain, None, i, j, facet, u, v, z, k_x, k_y, k_z, cosine / n_z
+                )[0]
                 if fate == ESCAPED:
                     fate = leave(
-                        terrain, i, j, facet, u, v, z,
+                        terrain, None, i, j, facet, u, v, z,
                         2.0 * cosine * n_x - k_x, 2.0 * cosine * n_y - k_y,
                         2.0 * cosine * n_z - k_z, cosine / n_z,
                     )[0]  # fmt: skip
@@ -224,7 +226,7 @@ def show_facets(
                     for w in range(matrices.shape[0]):
                         n_stokes = matrices.shape[1]
                         facet_mueller(
-                            cones, k_x, k_y, k_z, slope_x, slope_y, optics, w, m, n_stokes,
+                            cones, k_x, k_y, k_z, n_x, n_y, n_z, optics, w, m, n_stokes,
                             mueller,
                         )  # fmt: skip
                         for row in range(n_stokes):

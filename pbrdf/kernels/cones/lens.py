@@ -11,8 +11,7 @@ import math
 from pbrdf.kernels import jit
 from pbrdf.kernels.optics.frames import PARALLEL
 from pbrdf.kernels.paths.random import uniform_pair
-from pbrdf.kernels.paths.transport import MAX_STEPS
-from pbrdf.kernels.terrain.heightfield import leave_facet
+from pbrdf.kernels.paths.transport import next_facet
 
 TWO_PI = 2.0 * math.pi
 # At least two thirds of the box about a lens are lens
@@ -158,6 +157,6 @@ def lens_direction(
 
 
 @jit(allocates=False)
-def leave(terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate):
-    """`leave_facet` as a function of its own: rays are sent from several places."""
-    return leave_facet(terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate, MAX_STEPS)
+def leave(terrain, mesh, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate):
+    """`next_facet` as a function of its own: rays are sent from several places."""
+    return next_facet(terrain, None, mesh, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate)

@@ -7,7 +7,7 @@ from pbrdf.kernels import jit
 from pbrdf.kernels.cones.lens import carried_axis
 from pbrdf.kernels.optics.frames import turn_frame
 from pbrdf.kernels.optics.fresnel import reflection_elements
-from pbrdf.kernels.paths.ray_bounce import bounce
+from pbrdf.kernels.paths.ray_bounce import bounce_at
 from pbrdf.kernels.paths.shading import reflect_once
 
 # Axes of both cones, their horizontal s axes (x, y; of the detector's beam sent backwards
@@ -19,7 +19,7 @@ Cones = namedtuple(
 
 
 @jit(allocates=False)
-def facet_mueller(cones, k_x, k_y, k_z, slope_x, slope_y, index, w, m, n_stokes, mueller):
+def facet_mueller(cones, k_x, k_y, k_z, n_x, n_y, n_z, index, w, m, n_stokes, mueller):
     """Matrix of light sent from the detector along -k to a facet and on to the source.
 
     In the frames of the instrument, whose polarisers keep to the axes of the cones.
@@ -27,8 +27,8 @@ def facet_mueller(cones, k_x, k_y, k_z, slope_x, slope_y, index, w, m, n_stokes,
     s_x, s_y, s_z = carried_axis(
         cones.d_x, cones.d_y, cones.d_z, cones.d_sx, cones.d_sy, k_x, k_y, k_z
     )
-    r_x, r_y, r_z, s_x, s_y, s_z, _, cos_beta, c_in, s_in = bounce(
-        -k_x, -k_y, -k_z, s_x, s_y, s_z, slope_x, slope_y
+    r_x, r_y, r_z, s_x, s_y, s_z, cos_beta, c_in, s_in = bounce_at(
+        -k_x, -k_y, -k_z, s_x, s_y, s_z, n_x, n_y, n_z
     )
     t_x, t_y, t_z = carried_axis(
         cones.i_x, cones.i_y, cones.i_z, cones.i_sx, cones.i_sy, r_x, r_y, r_z
@@ -57,14 +57,14 @@ def mean_mueller(cones, across, optics, n_stokes, mueller, out):
                 cones.i_x, cones.i_y, cones.i_z, cones.i_sx, cones.i_sy,
                 cones.half_i * across[q, 0], cones.half_i * across[q, 1],
             )  # fmt: skip
-            slope_x = -(k_x + l_x) / (k_z + l_z)
-            slope_y = -(k_y + l_y) / (k_z + l_z)
+            n_x, n_y, n_z = k_x + l_x, k_y + l_y, k_z + l_z
+            length = math.sqrt(n_x * n_x + n_y * n_y + n_z * n_z)
             weight = across[p, 2] * across[q, 2]
             for w in range(out.shape[0]):
                 for m in range(out.shape[1]):
                     facet_mueller(
-                        cones, k_x, k_y, k_z, slope_x, slope_y, optics, w, m, n_stokes,
-                        mueller,
+                        cones, k_x, k_y, k_z, n_x / length, n_y / length, n_z / length,
+                        optics, w, m, n_stokes, mueller,
                     )  # fmt: skip
                     for row in range(n_stokes):
                         for column in range(n_stokes):

@@ -32,12 +32,14 @@ from pbrdf.kernels.cones.targets import (
     light_from_base,
     place_axes,
 )
+from pbrdf.kernels.meshes.seek import BELOW, seek_facet
 from pbrdf.kernels.paths.random import uniform_pair
-from pbrdf.kernels.paths.ray_bounce import bounce, scatter
+from pbrdf.kernels.paths.ray_bounce import bounce_at, scatter_at
 from pbrdf.kernels.paths.shading import (
     COS_IN,
     COS_OUT,
     LABEL,
+    N_BELOW,
     N_ESCAPED,
     N_LEAKED,
     N_SEGMENTS,
@@ -48,9 +50,9 @@ from pbrdf.kernels.paths.shading import (
     TURN_C,
     TURN_S,
 )
-from pbrdf.kernels.paths.transport import MAX_STEPS
+from pbrdf.kernels.paths.transport import MAX_STEPS, label_of_facet, normal_of_facet
 from pbrdf.kernels.terrain.entry import STRIDE_PHI, TWO_PI, fraction, wrap_into
-from pbrdf.kernels.terrain.heightfield import ESCAPED, HIT, SIDE, facet_slopes, walk
+from pbrdf.kernels.terrain.heightfield import ESCAPED, HIT, LOST, SIDE, walk
 
 # Bundles of one cone: zenith and azimuth of its axis (uniform: any azimuth), half-angle,
 # the entry rectangle (corner x, y and lengths [cells]), lines and rays, five random shifts
@@ -78,16 +80,34 @@ STRIDE_B = 0.5698402909980532
 
 
 @jit(inline="always")
-def mirrored(v_x, v_y, v_z, slope_x, slope_y):
-    """Mirror image of a vector in a facet."""
-    square = 1.0 + slope_x * slope_x + slope_y * slope_y
-    twice = 2.0 * (v_z - slope_x * v_x - slope_y * v_y) / square
-    return v_x + twice * slope_x, v_y + twice * slope_y, v_z - twice
+def mirrored(v_x, v_y, v_z, n_x, n_y, n_z):
+    """Mirror image of a vector in a facet of this normal."""
+    twice = 2.0 * (v_x * n_x + v_y * n_y + v_z * n_z)
+    return v_x - twice * n_x, v_y - twice * n_y, v_z - twice * n_z
+
+
+@jit(forceinline=True)
+def begin(terrain, mesh, x, y, k_x, k_y, k_z):
+    """Follow a ray from an entry point (x, y) to the first facet it meets."""
+    fate, i, j, facet, u, v, z = LOST, 0, 0, -1, x, y, 0.0
+    if mesh is not None:
+        before = (mesh.frame.z_top - mesh.frame.z_high) / -k_z
+        fate, facet, i, u, v, z = seek_facet(
+            mesh, -1, 0, x - before * k_x, y - before * k_y, mesh.frame.z_top, k_x, k_y, k_z
+        )
+    if terrain is not None:
+        i = min(int(x), terrain.heights.shape[0] - 1)
+        j = min(int(y), terrain.heights.shape[1] - 1)
+        fate, i, j, facet, u, v, z = walk(
+            terrain, i, j, -1, x - i, y - j, terrain.z_top,
+            k_x / terrain.pitch_x, k_y / terrain.pitch_y, k_z, 0.0, MAX_STEPS,
+        )  # fmt: skip
+    return fate, i, j, facet, u, v, z
 
 
 @jit(allocates=False)
 def follow_bundle(
-    terrain, i, j, u, v, z, cos_phi, sin_phi, bundle, name, targets, axes, record, hits,
+    terrain, mesh, x, y, cos_phi, sin_phi, bundle, name, targets, axes, record, hits,
     optics, rule, catch,
 ):  # fmt: skip
     """Follow one ray of a bundle, with all the rays it sends out, to their ends."""
@@ -112,10 +132,7 @@ def follow_bundle(
     g_x, g_y, g_z = 0.0, 0.0, -1.0
 
     catch.counts[N_SEGMENTS] += 1
-    fate, i, j, facet, u, v, z = walk(
-        terrain, i, j, -1, u, v, z,
-        k_x / terrain.pitch_x, k_y / terrain.pitch_y, k_z, 0.0, MAX_STEPS,
-    )  # fmt: skip
+    fate, i, j, facet, u, v, z = begin(terrain, mesh, x, y, k_x, k_y, k_z)
     if fate == SIDE:
         catch.counts[N_SIDE] += 1
         if splits:
@@ -131,23 +148,21 @@ def follow_bundle(
     event = 0
     while True:
         while fate == HIT and bounces < max_bounces:
-            slope_x, slope_y = facet_slopes(terrain, i, j, facet)
+            n_x, n_y, n_z, steep = normal_of_facet(terrain, mesh, i, j, facet)
             # Only the base scatters at a hit that a base has its own record of
-            r_x, r_y, r_z, p_x, p_y, p_z, leave_rate, cos_beta, c2, s2 = bounce(
-                k_x, k_y, k_z, s_x, s_y, s_z, slope_x, slope_y
+            r_x, r_y, r_z, p_x, p_y, p_z, cos_beta, c2, s2 = bounce_at(
+                k_x, k_y, k_z, s_x, s_y, s_z, n_x, n_y, n_z
             )
             record[bounces, 0, COS_IN] = cos_beta
             record[bounces, 0, TURN_C] = c2
             record[bounces, 0, TURN_S] = s2
-            record[bounces, 0, LABEL] = (
-                terrain.labels[i, j] if terrain.labels.size > 0 else 0
-            )
+            record[bounces, 0, LABEL] = label_of_facet(terrain, mesh, i, j, facet)
             if splits:
                 asked = rule.kind == SHARE or (rule.kind == FAR_END and mirrors > 0)
                 if asked:
                     event = light_from_base(
-                        terrain, i, j, facet, u, v, z, slope_x, slope_y, weight,
-                        targets, axes, bundle.stream, name, event, record, bounces,
+                        terrain, mesh, i, j, facet, u, v, z, weight, targets, axes,
+                        bundle.stream, name, event, record, bounces,
                         optics, catch,
                     )  # fmt: skip
                 if asked or rule.kind == COUNT:
@@ -172,11 +187,11 @@ def follow_bundle(
             since += 1
             if not diffused:
                 mirrors += 1
-                e_x, e_y, e_z = mirrored(e_x, e_y, e_z, slope_x, slope_y)
-                g_x, g_y, g_z = mirrored(g_x, g_y, g_z, slope_x, slope_y)
+                e_x, e_y, e_z = mirrored(e_x, e_y, e_z, n_x, n_y, n_z)
+                g_x, g_y, g_z = mirrored(g_x, g_y, g_z, n_x, n_y, n_z)
             catch.counts[N_SEGMENTS] += 1
             fate, i, j, facet, u, v, z = leave(
-                terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate
+                terrain, mesh, i, j, facet, u, v, z, k_x, k_y, k_z, cos_beta * steep
             )
 
         if fate == ESCAPED and bounces > 0:
@@ -233,6 +248,8 @@ def follow_bundle(
                 end = N_TRUNCATED
             elif fate == SIDE:
                 end = N_SIDE
+            elif fate == BELOW:
+                end = N_BELOW
             lose_path(weight, end, record, bounces, optics, catch)
 
         # The next ray into the hemisphere above the last hit: its record is still in place
@@ -253,23 +270,21 @@ def follow_bundle(
         weight = hits[last, H_WEIGHT]
         diffused = True
         since = 0
-        slope_x, slope_y = facet_slopes(terrain, i, j, facet)
+        n_x, n_y, n_z, steep = normal_of_facet(terrain, mesh, i, j, facet)
         draw_a, draw_b = uniform_pair(bundle.stream, name, event)
         event += 1
-        k_x, k_y, k_z, s_x, s_y, s_z, leave_rate, cosine = scatter(
-            slope_x, slope_y, draw_a, draw_b
-        )
+        k_x, k_y, k_z, s_x, s_y, s_z, cosine = scatter_at(n_x, n_y, n_z, draw_a, draw_b)
         record[bounces, 0, COS_OUT] = cosine
         bounces += 1
         catch.counts[N_SEGMENTS] += 1
         fate, i, j, facet, u, v, z = leave(
-            terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate
+            terrain, mesh, i, j, facet, u, v, z, k_x, k_y, k_z, cosine * steep
         )
 
 
 @jit(allocates=False)
-def trace_bundles(terrain, bundle, targets, axes, record, hits, optics, rule, catch):
-    """Send all bundles of a cone over the surface, line by line.
+def trace_bundles(terrain, mesh, bundle, targets, axes, record, hits, optics, rule, catch):
+    """Send all bundles of a cone over a terrain or a mesh, the other None, line by line.
 
     axes        (targets, N_AXES), record (bounces + 1, 1, N_RECORD) and hits (bounces,
                 N_HIT) are room to work in
@@ -293,9 +308,7 @@ def trace_bundles(terrain, bundle, targets, axes, record, hits, optics, rule, ca
             x = wrap_into(
                 launch[0] + launch[2] * (ray + offset) / rays, launch[0], launch[2]
             )
-            i = min(int(x), terrain.heights.shape[0] - 1)
-            j = min(int(y), terrain.heights.shape[1] - 1)
             follow_bundle(
-                terrain, i, j, x - i, y - j, terrain.z_top, cos_phi, sin_phi, bundle,
-                first + ray, targets, axes, record, hits, optics, rule, catch,
+                terrain, mesh, x, y, cos_phi, sin_phi, bundle, first + ray, targets,
+                axes, record, hits, optics, rule, catch,
             )  # fmt: skip

@@ -15,10 +15,12 @@ from pbrdf.kernels.paths.shading import (
     COS_OUT,
     LABEL,
     LEAKED,
+    N_BELOW,
     N_SIDE,
     N_TRUNCATED,
     SIDEWAYS,
     SPECULAR,
+    TRANSMITTED,
     TRUNCATED,
     TURN_C,
     TURN_S,
@@ -136,6 +138,8 @@ def lose_path(weight, end, record, bounces, optics, catch):
         lost = TRUNCATED
     elif end == N_SIDE:
         lost = SIDEWAYS
+    elif end == N_BELOW:
+        lost = TRANSMITTED
     for w in range(catch.energy.shape[0]):
         record[bounces, 0, TURN_C] = 1.0
         record[bounces, 0, TURN_S] = 0.0

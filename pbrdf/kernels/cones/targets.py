@@ -5,9 +5,11 @@ import math
 from pbrdf.kernels import jit
 from pbrdf.kernels.cones.lens import cap_direction, leave
 from pbrdf.kernels.cones.record import A_SX, A_SY, A_X, A_Y, A_Z, catch_path
+from pbrdf.kernels.meshes.search import across_of
 from pbrdf.kernels.optics.frames import PARALLEL
 from pbrdf.kernels.paths.random import uniform_pair
 from pbrdf.kernels.paths.shading import COS_OUT, N_SEGMENTS
+from pbrdf.kernels.paths.transport import normal_of_facet
 from pbrdf.kernels.terrain.heightfield import ESCAPED
 
 # Columns of a target: sine and cosine of zenith, of azimuth from the bundle, of half-angle,
@@ -32,13 +34,11 @@ def place_axes(bundle, targets, cos_phi, sin_phi, axes):
 
 @jit(allocates=False)
 def light_from_base(
-    terrain, i, j, facet, u, v, z, slope_x, slope_y, weight, targets, axes, stream, name,
-    event, record, bounces, optics, catch,
+    terrain, mesh, i, j, facet, u, v, z, weight, targets, axes, stream, name, event,
+    record, bounces, optics, catch,
 ):  # fmt: skip
     """Ask each target for its light on the base under a facet: one ray into its cone."""
-    n_z = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
-    n_x = -slope_x * n_z
-    n_y = -slope_y * n_z
+    n_x, n_y, n_z, steep = normal_of_facet(terrain, mesh, i, j, facet)
     for target in range(targets.shape[0]):
         draw_a, draw_b = uniform_pair(stream, name, event)
         event += 1
@@ -50,7 +50,7 @@ def light_from_base(
         cosine = n_x * k_x + n_y * k_y + n_z * k_z
         if cosine <= 0.0:
             continue
-        fate = leave(terrain, i, j, facet, u, v, z, k_x, k_y, k_z, cosine / n_z)[0]
+        fate = leave(terrain, mesh, i, j, facet, u, v, z, k_x, k_y, k_z, cosine * steep)[0]
         catch.counts[N_SEGMENTS] += 1
         if fate != ESCAPED:
             continue
@@ -63,8 +63,7 @@ def light_from_base(
             s_x, s_y, s_z = s_x * scale, s_y * scale, s_z * scale
         else:
             # Along the normal every axis across it serves
-            scale = 1.0 / math.sqrt(n_x * n_x + n_z * n_z)
-            s_x, s_y, s_z = n_z * scale, 0.0, -n_x * scale
+            s_x, s_y, s_z, _, _, _ = across_of(n_x, n_y, n_z)
         record[bounces, 0, COS_OUT] = cosine
         # The solid angle of the cone over pi: the base spreads its light as cosine / pi
         share = 2.0 * (1.0 - targets[target, T_COS_HALF])

@@ -11,25 +11,25 @@ from pbrdf.kernels import jit
 GROUND, BODIES, SHEET = 0, 1, 2
 NO_INSTANCE = 0xFFFFFFFF
 
-# Extent and frame of a mesh: kind, whether it repeats, its periods, the corner of the
-# middle image, the box in which all images are at hand, its free space below and above,
-# its highest point, the slope from which on a rising ray is free at once (inf: not to be
-# used), the centre and scale to the units of Embree, the lift of a ray off its facet and
-# the tolerance of places [um]
+# Extent and frame of a mesh: kind, whether its parts may cut into each other and whether it
+# repeats, its periods, the corner of the middle image, the box in which all images are at
+# hand, its free space below and above, its highest point, the slope from which on a rising
+# ray is free at once (inf: not to be used), the centre and scale to the units of Embree,
+# the lift of a ray off its facet and the tolerance of places [um]
 MeshFrame = namedtuple(
     "MeshFrame",
-    "kind periodic period_x period_y cell_x cell_y low_x high_x low_y high_y "
+    "kind crossing periodic period_x period_y cell_x cell_y low_x high_x low_y high_y "
     "z_bottom z_top z_high free_slope center_x center_y center_z scale lift tolerance",
 )
 # A mesh: corners (vertices, 3) [um], faces (faces, 3), unit normals (faces, 3), labels
 # (faces,; of no size: all 0) and its frame; then Embree: addresses of `rtcIntersect1`, of
-# the scene, of a ray and of the arguments of an exact search; the ray as float32 and
-# uint32, the periods that each image is moved by (images, 2), and what the search asks and
-# finds (N_QUERY,) and how often it ran (1,)
+# `rtcOccluded1`, of the scene, of a ray and of the arguments of an exact search; the ray as
+# float32 and uint32, the periods that each image is moved by (images, 2), and what the
+# search asks and finds (N_QUERY,) and how often it ran (1,)
 Facets = namedtuple(
     "Facets",
-    "corners faces normals labels frame intersect scene place arguments ray words images "
-    "query searches",
+    "corners faces normals labels frame intersect occluded scene place arguments ray words "
+    "images query searches",
 )
 
 

@@ -20,10 +20,10 @@ from pbrdf.kernels.meshes.memory import (
 )
 
 # Columns of a query: true start and direction of the ray; facet it leaves (or -1) and the
-# middle of that; tolerances of places across edges and along the ray; then what was found:
+# middle of that; tolerance of places, from planes and across edges; then what was found:
 # time, facet and image of the nearest front, and time of the nearest back
 Q_X, Q_Y, Q_Z, Q_KX, Q_KY, Q_KZ, Q_FROM, Q_MX, Q_MY, Q_MZ = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
-Q_EDGE, Q_TOUCH, Q_TIME, Q_FACE, Q_IMAGE, Q_BACK, N_QUERY = 10, 11, 12, 13, 14, 15, 16
+Q_NEAR, Q_TIME, Q_FACE, Q_IMAGE, Q_BACK, N_QUERY = 10, 11, 12, 13, 14, 15
 # Bytes from the context of a query to these columns, and from them to the addresses of
 # corners, faces, normals and images
 AT_QUERY, AT_ADDRESSES = 64, 64 + 8 * N_QUERY
@@ -67,12 +67,14 @@ def judge(given):
     x = read_float64(query + 8 * Q_X) - base_x
     y = read_float64(query + 8 * Q_Y) - base_y
     z = read_float64(query + 8 * Q_Z) - a_z
-    time = -(x * n_x + y * n_y + z * n_z) / rate
-    touch = read_float64(query + 8 * Q_TOUCH)
-    if time < -touch or (rate > 0.0 and time <= touch):
+    height = x * n_x + y * n_y + z * n_z
+    near = read_float64(query + 8 * Q_NEAR)
+    if height < -near if rate < 0.0 else height > -near:
         return
-    if rate < 0.0 and time <= touch and read_float64(query + 8 * Q_FROM) >= 0.0:
-        # The ray starts on this facet too: met only where the two form a hollow edge
+    left = int(read_float64(query + 8 * Q_FROM))
+    if rate < 0.0 and height <= near and left >= 0 and share_corner(faces, face, left):
+        # The ray starts on this facet too: met only where the two form a hollow edge, as
+        # those of bodies that cut into each other always do
         front = (
             (read_float64(query + 8 * Q_MX) - base_x) * n_x
             + (read_float64(query + 8 * Q_MY) - base_y) * n_y
@@ -80,6 +82,7 @@ def judge(given):
         )
         if front <= 0.0:
             return
+    time = max(-height / rate, 0.0)
     x += time * k_x
     y += time * k_y
     z += time * k_z
@@ -103,10 +106,8 @@ def judge(given):
     )
     # A front is met up to its edges; a back tells of a fault only well inside of them, as a
     # ray that grazes an edge may touch both
-    edge = read_float64(query + 8 * Q_EDGE)
-    if least < (edge if rate > 0.0 else -edge):
+    if least < (near if rate > 0.0 else -near):
         return
-    time = max(time, 0.0)
     if rate > 0.0:
         if time < read_float64(query + 8 * Q_BACK):
             write_float64(query + 8 * Q_BACK, time)
@@ -114,6 +115,17 @@ def judge(given):
         write_float64(query + 8 * Q_TIME, time)
         write_float64(query + 8 * Q_FACE, float(face))
         write_float64(query + 8 * Q_IMAGE, float(image))
+
+
+@jit(forceinline=True)
+def share_corner(faces, one, other):
+    """Whether two facets have a corner in common; `faces` is the address of their table."""
+    for a in range(3):
+        corner = read_uint32(faces + 12 * one + 4 * a)
+        for b in range(3):
+            if corner == read_uint32(faces + 12 * other + 4 * b):
+                return True
+    return False
 
 
 @jit(forceinline=True)
@@ -128,9 +140,12 @@ def inside_edge(x, y, z, e_x, e_y, e_z, n_x, n_y, n_z):
 
 
 @jit(forceinline=True)
-def pose_query(mesh, face, x, y, z, k_x, k_y, k_z, edge):
-    """Write the true ray into the query, and forget what was found before."""
-    query, frame = mesh.query, mesh.frame
+def pose_query(mesh, face, x, y, z, k_x, k_y, k_z, near):
+    """Write the true ray into the query, and forget what was found before.
+
+    `near` is the tolerance of places, from planes and across edges.
+    """
+    query = mesh.query
     query[Q_X] = x
     query[Q_Y] = y
     query[Q_Z] = z
@@ -144,8 +159,7 @@ def pose_query(mesh, face, x, y, z, k_x, k_y, k_z, edge):
             for corner in range(3):
                 middle += mesh.corners[mesh.faces[face, corner], axis]
             query[Q_MX + axis] = middle / 3.0
-    query[Q_EDGE] = edge
-    query[Q_TOUCH] = frame.tolerance
+    query[Q_NEAR] = near
     query[Q_TIME] = math.inf
     query[Q_FACE] = -1.0
     query[Q_IMAGE] = 0.0

@@ -52,13 +52,16 @@ BELOW, WRONG = 6, 7
 MAX_PERIODS = 100_000
 # Start of an exact search behind its ray, and beside it, in lifts
 BEHIND, BESIDE = 4.0, 2.0
-# Tolerance across edges of the second try, in lifts: the rounding of float32
+# How far back along a ray from its hit another facet makes the place delicate, in lifts: so
+# far, and so many times what a lift of its start moves a hit on a slanting facet
+BEFORE, SLANTING, LEAST_SLANT = 4.0, 2.0, 1e-3
+# Tolerance of places in the second try, in lifts: the rounding of float32
 WIDER = 4.0
 
 
 @jit(forceinline=True)
-def shoot(mesh, x, y, z, k_x, k_y, k_z, nearest, farthest, arguments):
-    """Let Embree follow a ray from a place [um] along the unit vector k, both float32."""
+def write_ray(mesh, x, y, z, k_x, k_y, k_z, nearest, farthest):
+    """Write a ray from a place [um] along the unit vector k for Embree, in float32."""
     frame, ray, words = mesh.frame, mesh.ray, mesh.words
     ray[ORIGIN] = (x - frame.center_x) * frame.scale
     ray[ORIGIN + 1] = (y - frame.center_y) * frame.scale
@@ -74,19 +77,53 @@ def shoot(mesh, x, y, z, k_x, k_y, k_z, nearest, farthest, arguments):
     words[FLAGS] = 0
     words[GEOMETRY] = NOTHING
     words[INSTANCE] = NOTHING
+
+
+@jit(forceinline=True)
+def shoot(mesh, x, y, z, k_x, k_y, k_z, nearest, farthest, arguments):
+    """Let Embree follow a ray to the first facet, or call back for all of them."""
+    write_ray(mesh, x, y, z, k_x, k_y, k_z, nearest, farthest)
     call_embree(mesh.intersect, mesh.scene, mesh.place, arguments)
 
 
+@jit(forceinline=True)
+def is_delicate(mesh, face, x, y, z, k_x, k_y, k_z, before):
+    """Whether another facet is so near a place that a ray has met that float32 may err.
+
+    Where parts cut into each other, what lies inside of one may stop a ray that has strayed
+    into it, so that it would not be noticed. Asked for is whether anything lies between
+    the ray a little before it met the facet and its next start, lifted off the facet.
+    """
+    lift = mesh.frame.lift
+    n_x, n_y, n_z = facet_normal(mesh, face)
+    d_x = before * k_x + lift * n_x
+    d_y = before * k_y + lift * n_y
+    d_z = before * k_z + lift * n_z
+    length = math.sqrt(d_x * d_x + d_y * d_y + d_z * d_z)
+    write_ray(
+        mesh, x - before * k_x, y - before * k_y, z - before * k_z,
+        d_x / length, d_y / length, d_z / length, 0.0, length,
+    )  # fmt: skip
+    call_embree(mesh.occluded, mesh.scene, mesh.place, 0)
+    # Embree marks a ray that something stops
+    return mesh.ray[FARTHEST] < 0.0
+
+
 @jit(allocates=False)
-def search(mesh, face, x, y, z, k_x, k_y, k_z, t_end):
-    """Find the next facet exactly: (fate, facet, image, time); ESCAPED if there is none."""
+def search(mesh, face, x, y, z, k_x, k_y, k_z, t_end, delicate):
+    """Find the next facet exactly: (fate, facet, image, time); ESCAPED if there is none.
+
+    From a delicate place at once with the tolerance that is else that of a second try.
+    """
     query, lift = mesh.query, mesh.frame.lift
     mesh.searches[0] += 1
     a_x, a_y, a_z, b_x, b_y, b_z = across_of(k_x, k_y, k_z)
     back = BEHIND * lift
-    for attempt in range(2):
-        edge = mesh.frame.tolerance if attempt == 0 else WIDER * lift
-        pose_query(mesh, face, x, y, z, k_x, k_y, k_z, edge)
+    for attempt in range(delicate, 2):
+        # Where two facets cross, float32 may have taken the one behind the other: the ray
+        # then starts a hair inside the solid, and what it should have met is behind it
+        near = mesh.frame.tolerance if attempt == 0 else WIDER * lift
+        pose_query(mesh, face, x, y, z, k_x, k_y, k_z, near)
         for side in range(5):
             # The line itself and four lines around it: one of them meets what is near
             a = BESIDE * lift * (1.0 if side == 1 else -1.0 if side == 2 else 0.0)
@@ -97,7 +134,7 @@ def search(mesh, face, x, y, z, k_x, k_y, k_z, t_end):
                 z - back * k_z + a * a_z + b * b_z, k_x, k_y, k_z, 0.0, t_end + 2.0 * back,
                 mesh.arguments,
             )  # fmt: skip
-        if query[Q_TIME] <= query[Q_BACK] + edge and query[Q_FACE] >= 0.0:
+        if query[Q_TIME] <= query[Q_BACK] + near and query[Q_FACE] >= 0.0:
             return HIT, int(query[Q_FACE]), int(query[Q_IMAGE]), query[Q_TIME]
     if query[Q_BACK] < math.inf:
         return WRONG, -1, 0, query[Q_BACK]
@@ -115,8 +152,10 @@ def time_to_side(x, k_x, low, high):
 
 
 @jit(forceinline=True)
-def ask_embree(mesh, face, x, y, z, k_x, k_y, k_z, t_end):
+def ask_embree(mesh, face, x, y, z, k_x, k_y, k_z, t_end, delicate):
     """Find the next facet, as `search`, which it leaves what may mislead float32."""
+    if delicate:
+        return search(mesh, face, x, y, z, k_x, k_y, k_z, t_end, 1)
     lift_x = lift_y = lift_z = 0.0
     if face >= 0:
         n_x, n_y, n_z = facet_normal(mesh, face)
@@ -133,56 +172,85 @@ def ask_embree(mesh, face, x, y, z, k_x, k_y, k_z, t_end):
     )
     if rate < 0.0 and time >= 0.0 and found != face:
         return HIT, found, image, time
-    return search(mesh, face, x, y, z, k_x, k_y, k_z, t_end)
+    return search(mesh, face, x, y, z, k_x, k_y, k_z, t_end, 0)
+
+
+@jit(forceinline=True)
+def end_of_way(mesh, face, image, x, y, z):
+    """Bring a place on an image of a facet onto the facet itself."""
+    return place_on_facet(
+        mesh, face, x - mesh.images[image, 0], y - mesh.images[image, 1], z
+    )
 
 
 @jit(allocates=False)
-def seek_facet(mesh, face, x, y, z, k_x, k_y, k_z):
-    """Follow a ray along the unit vector k: (fate, facet, x, y, z) where it ends.
+def seek_facet(mesh, face, delicate, x, y, z, k_x, k_y, k_z):
+    """Follow a ray along the unit vector k: (fate, facet, delicate, x, y, z) at its end.
 
-    It starts on a facet, or in free space where that is -1.
+    It starts on a facet, or in free space where that is -1. `delicate` is 1 at a place on a
+    facet near which another crosses it, else 0.
     """
     frame = mesh.frame
     free = frame.free_slope
     if face >= 0 and k_z > 0.0 and k_z * k_z >= free * free * (k_x * k_x + k_y * k_y):
-        return ESCAPED, -1, x, y, z
+        return ESCAPED, -1, 0, x, y, z
     for _ in range(MAX_PERIODS):
         t_x = time_to_side(x, k_x, frame.low_x, frame.high_x)
         t_y = time_to_side(y, k_y, frame.low_y, frame.high_y)
         t_z = time_to_side(z, k_z, frame.z_bottom, frame.z_top)
         t_end = max(min(t_x, t_y, t_z), 0.0)
         fate, found, image, time = ask_embree(
-            mesh, face, x, y, z, k_x, k_y, k_z, t_end + frame.lift
+            mesh, face, x, y, z, k_x, k_y, k_z, t_end + frame.lift, delicate
         )
         if fate == ESCAPED and t_z <= t_end and k_z < 0.0 and frame.kind != BODIES:
             # Through the ground, if at an edge or a vertex that Embree missed
             fate, found, image, time = search(
-                mesh, face, x, y, z, k_x, k_y, k_z, t_end + frame.lift
+                mesh, face, x, y, z, k_x, k_y, k_z, t_end + frame.lift, delicate
             )
         if fate == HIT:
-            x, y, z = place_on_facet(
-                mesh, found, x + time * k_x - mesh.images[image, 0],
-                y + time * k_y - mesh.images[image, 1], z + time * k_z,
-            )  # fmt: skip
-            return HIT, found, x, y, z
+            end_x, end_y, end_z = end_of_way(
+                mesh, found, image, x + time * k_x, y + time * k_y, z + time * k_z
+            )
+            close = 0
+            if frame.crossing:
+                n_x, n_y, n_z = facet_normal(mesh, found)
+                slant = max(-(k_x * n_x + k_y * n_y + k_z * n_z), LEAST_SLANT)
+                before = frame.lift * (BEFORE + SLANTING / slant)
+                # So is the end of a way so short that its start is as near
+                if time < before or is_delicate(
+                    mesh, found, end_x, end_y, end_z, k_x, k_y, k_z, before
+                ):
+                    close = 1
+            if close:
+                # Which of the facets there comes first, float64 has to say
+                fate, other, image, time = search(
+                    mesh, face, x, y, z, k_x, k_y, k_z, time + before, delicate
+                )
+                if fate == HIT:
+                    found = other
+                    end_x, end_y, end_z = end_of_way(
+                        mesh, found, image, x + time * k_x, y + time * k_y, z + time * k_z
+                    )
+            return HIT, found, close, end_x, end_y, end_z
         if fate == WRONG:
-            return WRONG, -1, x, y, z
+            return WRONG, -1, 0, x, y, z
         x += t_end * k_x
         y += t_end * k_y
         z += t_end * k_z
         if t_z <= t_end:
             if k_z > 0.0:
-                return ESCAPED, -1, x, y, z
+                return ESCAPED, -1, 0, x, y, z
             if frame.kind == GROUND:
-                return LOST, -1, x, y, z
-            return BELOW if frame.kind == BODIES else SIDE, -1, x, y, z
+                return LOST, -1, 0, x, y, z
+            return BELOW if frame.kind == BODIES else SIDE, -1, 0, x, y, z
         if not frame.periodic:
             if frame.kind == BODIES:
                 # Nothing lies beyond the box of the bodies
-                return ESCAPED if k_z > 0.0 else BELOW, -1, x, y, z
-            return SIDE, -1, x, y, z
+                return ESCAPED if k_z > 0.0 else BELOW, -1, 0, x, y, z
+            return SIDE, -1, 0, x, y, z
         # The same place, as many periods back as bring it into the middle image
         x -= frame.period_x * math.floor((x - frame.cell_x) / frame.period_x)
         y -= frame.period_y * math.floor((y - frame.cell_y) / frame.period_y)
         face = -1
-    return LOST, -1, x, y, z
+        delicate = 0
+    return LOST, -1, 0, x, y, z

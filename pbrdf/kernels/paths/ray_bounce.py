@@ -66,18 +66,16 @@ def new_axis(s_x, s_y, s_z, w_x, w_y, w_z):
 
 
 @jit(forceinline=True)
-def bounce(k_x, k_y, k_z, s_x, s_y, s_z, slope_x, slope_y):
-    """Reflect a beam and its frame at a facet.
+def bounce_at(k_x, k_y, k_z, s_x, s_y, s_z, n_x, n_y, n_z):
+    """Reflect a beam and its frame at a unit normal.
 
-    Returns the new direction, the new s axis, the speed at which the ray leaves the facet
-    upwards, the cosine of incidence and the turn of the frame into the plane of incidence.
+    Returns the new direction, the new s axis, the cosine of incidence and the turn of the
+    frame into the plane of incidence.
     """
-    r_x, r_y, r_z, w_x, w_y, w_z, leave_rate, cos_beta = mirror(
-        k_x, k_y, k_z, slope_x, slope_y
-    )
+    r_x, r_y, r_z, w_x, w_y, w_z, cos_beta = mirror_at(k_x, k_y, k_z, n_x, n_y, n_z)
     c2, s2 = turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, w_x, w_y, w_z)
     s_x, s_y, s_z = new_axis(s_x, s_y, s_z, w_x, w_y, w_z)
-    return r_x, r_y, r_z, s_x, s_y, s_z, leave_rate, cos_beta, c2, s2
+    return r_x, r_y, r_z, s_x, s_y, s_z, cos_beta, c2, s2
 
 
 @jit(forceinline=True)
@@ -90,17 +88,6 @@ def exit_turn(k_x, k_y, k_z, s_x, s_y, s_z, cos_phi_i, sin_phi_i):
         m_x = -sin_phi_i
         m_y = cos_phi_i
     return turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, m_x, m_y, 0.0)
-
-
-@jit
-def scatter(slope_x, slope_y, draw_a, draw_b):
-    """Spread light about the normal of a facet of a height field, as `scatter_at`.
-
-    The speed at which the ray leaves the facet upwards comes before the cosine.
-    """
-    n_x, n_y, n_z, length = normal_of_slopes(slope_x, slope_y)
-    k_x, k_y, k_z, s_x, s_y, s_z, cosine = scatter_at(n_x, n_y, n_z, draw_a, draw_b)
-    return k_x, k_y, k_z, s_x, s_y, s_z, cosine * length, cosine
 
 
 @jit

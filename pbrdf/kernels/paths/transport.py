@@ -104,7 +104,8 @@ def next_facet(terrain, tree, mesh, i, j, facet, u, v, z, k_x, k_y, k_z, leave_r
     """Follow a ray from a facet to the next; on a mesh (u, v, z) is its place [um]."""
     fate = LOST
     if mesh is not None:
-        fate, facet, u, v, z = seek_facet(mesh, facet, u, v, z, k_x, k_y, k_z)
+        # The number of a cell, of which a mesh has none, tells whether a place is delicate
+        fate, facet, i, u, v, z = seek_facet(mesh, facet, i, u, v, z, k_x, k_y, k_z)
     if terrain is not None:
         fate, i, j, facet, u, v, z = next_on_terrain(
             terrain, tree, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate
@@ -387,12 +388,12 @@ def trace_mesh_batch(mesh, source, record, waiting, spectra, optics, tally):
             s = length * ((ray + offset) / rays)
             x = wrap_into(start_x + speed_x * s, launch[0], launch[2])
             y = wrap_into(start_y + speed_y * s, launch[1], launch[3])
-            fate, facet, x, y, z = seek_facet(
-                mesh, -1, x + before * sin_t * cos_b, y + before * sin_t * sin_b, z_top,
+            fate, facet, delicate, x, y, z = seek_facet(
+                mesh, -1, 0, x + before * sin_t * cos_b, y + before * sin_t * sin_b, z_top,
                 -sin_t * cos_b, -sin_t * sin_b, -cos_t,
             )  # fmt: skip
             trace_ray(
-                None, None, mesh, fate, 0, 0, facet, x, y, z, beam, source.stream,
+                None, None, mesh, fate, delicate, 0, facet, x, y, z, beam, source.stream,
                 first + ray, record, waiting, spectra, optics, tally,
             )  # fmt: skip
     tally.counts[N_EXACT] += mesh.searches[0]

@@ -46,6 +46,8 @@ class MeshSurface:
     kind : {"ground", "bodies", "sheet"}
         Whether the mesh is closed towards below, so that no light passes; or bodies with
         nothing under them; or an open sheet.
+    parts : int
+        Number of parts that hang together.
     repairs : tuple of str
         What was mended, with counts and places; each is also a warning.
 
@@ -76,6 +78,7 @@ class MeshSurface:
     period: tuple[float, float] | None
     kind: str
     repairs: tuple[str, ...] = field(repr=False)
+    parts: int = field(repr=False)
 
     def __init__(
         self,
@@ -123,6 +126,7 @@ class MeshSurface:
         for name, value in (
             ("vertices", done.vertices), ("faces", table), ("labels", done.labels),
             ("period", period), ("kind", sided.kind), ("repairs", done.notes),
+            ("parts", sided.bodies),
         ):  # fmt: skip
             object.__setattr__(self, name, value)
 
