@@ -200,3 +200,46 @@ def test_a_thousand_bounces_keep_the_direction_a_unit_vector():
     assert fate == ESCAPED
     assert len(faces) > 1000
     assert_allclose(np.abs(out), np.abs(k), atol=1e-12)
+
+
+def test_rays_at_the_line_where_bodies_cut_into_each_other_stay_outside():
+    """Two facets that cross, neither an edge of the mesh: float32 alone takes either."""
+    box = trimesh.creation.box((3.0, 2.0, 1.4))
+    box.apply_transform(trimesh.transformations.rotation_matrix(0.6, [0.3, 1.0, 0.2]))
+    other = trimesh.creation.box((1.0, 6.0, 0.9))
+    other.apply_transform(trimesh.transformations.rotation_matrix(0.9, [1.0, 0.4, 0.1]))
+    mesh = MeshSurface(
+        joined(plate(), pair(box, (5.0, 4.0, 0.2)), pair(other, (5.3, 4.1, 0.7))),
+        (10.0, 8.0),
+    )
+    field = MeshField.of(mesh)
+    facets = field.facets()
+    corners = np.asarray(mesh.vertices)[np.asarray(mesh.faces)]
+    # Where edges of facets would be if bodies were cut along each other
+    lines = trimesh.intersections.mesh_plane(
+        mesh.to_trimesh(), plane_normal=[0, 0, 1], plane_origin=[0, 0, 1e-12]
+    ).reshape(-1, 2, 3)
+    rng = np.random.default_rng(4)
+    top = mesh.bounds[1, 2] + 0.5
+    delicate = 0
+    for _ in range(1500):
+        a, b = lines[rng.integers(len(lines))]
+        aim = a + rng.random() * (b - a)
+        aim[:2] += 10.0 ** rng.uniform(-8, -3.5) * rng.normal(size=2)
+        aim[2] = 0.0
+        phi, cos = rng.uniform(0, 2 * np.pi), rng.uniform(0.05, 1.0)
+        k = -np.array([*(np.sqrt(1 - cos**2) * np.array([np.cos(phi), np.sin(phi)])), cos])
+        start = aim - k * top / cos
+        face, near, place = -1, 0, start
+        for _ in range(60):
+            fate, face, near, *place = seek_facet(facets, face, near, *place, *k)
+            if fate != HIT:
+                break
+            delicate += near
+            assert mesh.normals[face] @ k < 0.0
+            # Above the ground, and never below it inside a body
+            assert place[2] >= -1e-9
+            k = mirror(k, mesh.normals[face])
+        assert fate in (ESCAPED, HIT)
+    assert delicate > 300
+    assert len(corners) == 18 + 24
