@@ -184,8 +184,8 @@ def draw(curves):
 def main():
     """Print the table; draw the figure."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=8)
-    parser.add_argument("--rays", type=int, default=40_000)
+    parser.add_argument("--seeds", type=int, default=6)
+    parser.add_argument("--rays", type=int, default=20_000)
     parser.add_argument("--figure", action="store_true")
     options = parser.parse_args()
     rows, curves = [], {}

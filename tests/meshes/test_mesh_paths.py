@@ -237,8 +237,8 @@ def test_rays_at_the_line_where_bodies_cut_into_each_other_stay_outside():
                 break
             delicate += near
             assert mesh.normals[face] @ k < 0.0
-            # Above the ground, and never below it inside a body
-            assert place[2] >= -1e-9
+            # Above the ground, and never below it inside a body, but for what float32 knows
+            assert place[2] >= -4.0 * field.frame.lift
             k = mirror(k, mesh.normals[face])
         assert fate in (ESCAPED, HIT)
     assert delicate > 300
