@@ -55,6 +55,8 @@ BEHIND, BESIDE = 4.0, 2.0
 # How far back along a ray from its hit another facet makes the place delicate, in lifts: so
 # far, and so many times what a lift of its start moves a hit on a slanting facet
 BEFORE, SLANTING, LEAST_SLANT = 4.0, 2.0, 1e-3
+# And how far beside its next start
+ASIDE = 8.0
 # Tolerance of places in the second try, in lifts: the rounding of float32
 WIDER = 4.0
 
@@ -87,26 +89,45 @@ def shoot(mesh, x, y, z, k_x, k_y, k_z, nearest, farthest, arguments):
 
 
 @jit(forceinline=True)
+def is_blocked(mesh, x, y, z, d_x, d_y, d_z):
+    """Whether anything lies on the way from a place to another at (d_x, d_y, d_z). [um]"""
+    length = math.sqrt(d_x * d_x + d_y * d_y + d_z * d_z)
+    write_ray(mesh, x, y, z, d_x / length, d_y / length, d_z / length, 0.0, length)
+    call_embree(mesh.occluded, mesh.scene, mesh.place, 0)
+    # Embree marks a ray that something stops
+    return mesh.ray[FARTHEST] < 0.0
+
+
+@jit(allocates=False)
 def is_delicate(mesh, face, x, y, z, k_x, k_y, k_z, before):
     """Whether another facet is so near a place that a ray has met that float32 may err.
 
     Where parts cut into each other, what lies inside of one may stop a ray that has strayed
     into it, so that it would not be noticed. Asked for is whether anything lies between
-    the ray a little before it met the facet and its next start, lifted off the facet.
+    the ray a little before it met the facet and its next start, lifted off the facet, or
+    beside that start.
     """
     lift = mesh.frame.lift
     n_x, n_y, n_z = facet_normal(mesh, face)
-    d_x = before * k_x + lift * n_x
-    d_y = before * k_y + lift * n_y
-    d_z = before * k_z + lift * n_z
-    length = math.sqrt(d_x * d_x + d_y * d_y + d_z * d_z)
-    write_ray(
+    if is_blocked(
         mesh, x - before * k_x, y - before * k_y, z - before * k_z,
-        d_x / length, d_y / length, d_z / length, 0.0, length,
+        before * k_x + lift * n_x, before * k_y + lift * n_y, before * k_z + lift * n_z,
+    ):  # fmt: skip
+        return True
+    a_x, a_y, a_z, b_x, b_y, b_z = across_of(n_x, n_y, n_z)
+    x += lift * n_x
+    y += lift * n_y
+    z += lift * n_z
+    reach = ASIDE * lift
+    if is_blocked(
+        mesh, x - reach * a_x, y - reach * a_y, z - reach * a_z,
+        2.0 * reach * a_x, 2.0 * reach * a_y, 2.0 * reach * a_z,
+    ):  # fmt: skip
+        return True
+    return is_blocked(
+        mesh, x - reach * b_x, y - reach * b_y, z - reach * b_z,
+        2.0 * reach * b_x, 2.0 * reach * b_y, 2.0 * reach * b_z,
     )  # fmt: skip
-    call_embree(mesh.occluded, mesh.scene, mesh.place, 0)
-    # Embree marks a ray that something stops
-    return mesh.ray[FARTHEST] < 0.0
 
 
 @jit(allocates=False)
