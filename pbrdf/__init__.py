@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pbrdf._version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from pbrdf import materials
+    from pbrdf import materials, signatures
     from pbrdf.analytic import MicrofacetModel
     from pbrdf.contaminants import Drops, Film, Spheres
     from pbrdf.dew import compare_dew
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pbrdf.optics.materials import Material
     from pbrdf.scene.read import load_scene
     from pbrdf.scene.scene import Scene
+    from pbrdf.signatures.run import signature
     from pbrdf.simulation.run import simulate
     from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, MeshSurface
     from pbrdf.surface.mesh import morphologies
@@ -42,6 +43,8 @@ __all__ = [
     "materials",
     "morphologies",
     "observe",
+    "signature",
+    "signatures",
     "simulate",
 ]
 
@@ -62,12 +65,14 @@ _HOME = {
     "compare_dew": "pbrdf.dew",
     "load_scene": "pbrdf.scene.read",
     "observe": "pbrdf.observation.run",
+    "signature": "pbrdf.signatures.run",
     "simulate": "pbrdf.simulation.run",
 }
 
 _MODULES = {
     "materials": "pbrdf.materials",
     "morphologies": "pbrdf.surface.mesh.morphologies",
+    "signatures": "pbrdf.signatures",
 }
 
 

@@ -1,0 +1,25 @@
+"""What a sensor sees: Stokes radiance of a surface under sun, sky and its own warmth."""
+
+from pbrdf.signatures.comparison import contrast
+from pbrdf.signatures.image import image_axes
+from pbrdf.signatures.planck import black_body
+from pbrdf.signatures.rayleigh import RayleighSky, rayleigh_optical_depth
+from pbrdf.signatures.run import signature
+from pbrdf.signatures.skies import OvercastSky, SkyTable, ThermalSky, read_sky
+from pbrdf.signatures.smooth import SmoothSurface
+from pbrdf.signatures.sun import Sun
+
+__all__ = [
+    "OvercastSky",
+    "RayleighSky",
+    "SkyTable",
+    "SmoothSurface",
+    "Sun",
+    "ThermalSky",
+    "black_body",
+    "contrast",
+    "image_axes",
+    "rayleigh_optical_depth",
+    "read_sky",
+    "signature",
+]

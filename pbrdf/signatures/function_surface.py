@@ -1,0 +1,151 @@
+"""A surface whose BRDF is a function of the geometry, looked at from one direction."""
+
+from collections.abc import Callable
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from pbrdf.signatures.sun import Sun
+
+__all__ = ["EXCHANGED", "FunctionSurface", "Light"]
+
+# Stokes radiance of the light from zeniths and azimuths [rad], shape (..., 4)
+Light = Callable[[np.ndarray, np.ndarray], np.ndarray]
+Value = tuple[np.ndarray, np.ndarray]
+
+# Exchange of source and detector, the P of the conventions page
+EXCHANGED = np.array([1.0, 1.0, -1.0, 1.0])
+BLACK = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+class FunctionSurface:
+    """Integrals of a BRDF over the sky by adaptive quadrature, each with its error.
+
+    Parameters
+    ----------
+    source : object
+        With `brdf(theta_i, theta_s, dphi[, wavelength])` as `MicrofacetModel`; with
+        `coherent(theta_i, wavelength)` where part of the light stays a specular beam.
+    theta, phi : float
+        Direction to the sensor. [rad]
+    wavelength : float or None
+        [um]
+    rel_error : float
+        Error to reach, in units of the largest part.
+    """
+
+    statistical = False
+
+    def __init__(
+        self,
+        source: Any,
+        theta: float,
+        phi: float,
+        wavelength: float | None,
+        rel_error: float,
+    ) -> None:
+        from pbrdf.analytic.microfacet import MicrofacetModel
+
+        self.source = source
+        self.theta, self.phi, self.wavelength = theta, phi, wavelength
+        self.rel_error = rel_error
+        # Only this model depends on where the x axis of the surface lies
+        self.oriented = isinstance(source, MicrofacetModel)
+        self.beam = np.zeros((4, 4))
+        if hasattr(source, "coherent"):
+            self.beam = np.asarray(source.coherent(theta, wavelength))
+
+    def facing(self, sun: Sun, irradiance: float) -> Value:
+        """Stokes radiance of sunlight off the surface; irradiance facing the sun."""
+        fine, coarse = (self._disc(sun, irradiance, rings) for rings in (3, 2))
+        return fine, np.abs(fine - coarse)
+
+    def _disc(self, sun: Sun, irradiance: float, rings: int) -> np.ndarray:
+        theta, phi, weight = sun.disc(rings)
+        up = theta < pi / 2
+        theta, phi, weight = theta[up], phi[up], weight[up]
+        column = self._brdf(theta, self.theta, self.phi - phi, phi)[:, :, 0]
+        scattered = irradiance * (column * (weight * np.cos(theta))[:, None]).sum(0)
+        # The mirror direction lies in the disc: its radiance, dimmed by the surface
+        mirror = _angle(self.theta, self.phi + pi, sun.theta, sun.phi)
+        if mirror > sun.half_angle:
+            return scattered
+        radiance = irradiance / (pi * np.sin(sun.half_angle) ** 2)
+        return scattered + radiance * self.beam[:, 0]
+
+    def gather(self, light: Light) -> Value:
+        """Stokes radiance that the surface makes of the light of the whole sky."""
+
+        def integrand(theta: np.ndarray, dphi: np.ndarray) -> np.ndarray:
+            phi_i = self.phi - dphi
+            matrices = self._brdf(theta, self.theta, dphi, phi_i)
+            return np.einsum("nij,nj->ni", matrices, light(theta, phi_i))
+
+        value, error = self._hemisphere(integrand)
+        mirrored = light(np.array([self.theta]), np.array([self.phi + pi]))[0]
+        return value + self.beam @ mirrored, error
+
+    def emissivity(self) -> Value:
+        """Stokes vector emitted to the sensor over the radiance of a black body.
+
+        Kirchhoff's law with reciprocity: what would be absorbed of light sent back along
+        the way, (1, 0, 0, 0) - P R[0], R[0] the first row of what the hemisphere gets.
+        """
+
+        def integrand(theta: np.ndarray, dphi: np.ndarray) -> np.ndarray:
+            return self._brdf(self.theta, theta, dphi, self.phi)[:, 0]
+
+        row, error = self._hemisphere(integrand)
+        return BLACK - EXCHANGED * (row + self.beam[0]), error
+
+    def _brdf(self, theta_i: Any, theta_s: Any, dphi: Any, phi_i: Any) -> np.ndarray:
+        more: dict[str, Any] = {"phi_i": np.mod(phi_i, 2 * pi)} if self.oriented else {}
+        if self.wavelength is not None:
+            more["wavelength"] = self.wavelength
+        turned = np.mod(dphi, 2 * pi)
+        return np.asarray(self.source.brdf(theta_i, theta_s, turned, **more))
+
+    def _hemisphere(
+        self, function: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    ) -> Value:
+        """Integrate a function of zenith and dphi over the projected hemisphere."""
+        from scipy.integrate import cubature
+
+        def integrand(points: np.ndarray, side: float) -> np.ndarray:
+            # Cubes of the variables crowd the nodes about the specular direction
+            x, y = points[:, 0], points[:, 1]
+            theta = np.clip(self.theta + side * x**3, 0.0, pi / 2)
+            dphi = pi + pi * y**3
+            weight = abs(side) * 3 * x**2 * pi * 3 * y**2 * np.sin(theta) * np.cos(theta)
+            return function(theta, dphi) * weight[:, None]
+
+        sides = [side for side in (-self.theta, pi / 2 - self.theta) if side]
+        parts = [(side, half) for side in sides for half in (-1.0, 0.0)]
+        scale = sum(np.abs(_rough(integrand, side, half)).max() for side, half in parts)
+        total, error = np.zeros(4), np.zeros(4)
+        for side, half in parts:
+            found = cubature(
+                integrand, [0.0, half], [1.0, half + 1.0], rule="gk15", rtol=0.0,
+                atol=self.rel_error * max(scale, 1e-300), args=(side,),
+                max_subdivisions=500,
+            )  # fmt: skip
+            total, error = total + found.estimate, error + np.abs(found.error)
+        return total, error
+
+
+def _rough(integrand: Any, side: float, half: float) -> np.ndarray:
+    """Integral by a fixed rule, for the scale of the error."""
+    node, weight = np.polynomial.legendre.leggauss(16)
+    x = 0.5 + 0.5 * node
+    points = np.stack(np.meshgrid(x, half + x, indexing="ij"), axis=-1).reshape(-1, 2)
+    both = 0.25 * np.outer(weight, weight).ravel()
+    return np.asarray((integrand(points, side) * both[:, None]).sum(0))
+
+
+def _angle(theta_a: float, phi_a: float, theta_b: float, phi_b: float) -> float:
+    """Angle between two directions, exact also for small ones."""
+    from pbrdf.conventions import direction
+
+    a, b = direction(theta_a, phi_a), direction(theta_b, phi_b)
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))

@@ -1,0 +1,126 @@
+"""The sun: a disc of unpolarised light behind an atmosphere that only dims it."""
+
+from dataclasses import dataclass
+from math import asin, cos, exp, pi, sin
+
+import numpy as np
+
+from pbrdf.conventions import direction
+from pbrdf.errors import one_number
+from pbrdf.signatures.planck import Spectrum, black_body, spectral
+
+__all__ = ["Sun"]
+
+# Nominal solar radius over the astronomical unit (IAU 2015 resolution B3, 2012 B2)
+HALF_ANGLE = asin(6.957e8 / 1.495978707e11)
+# Nominal effective temperature (IAU 2015 resolution B3) [K]
+TEMPERATURE = 5772.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sun:
+    """Direct sunlight.
+
+    Parameters
+    ----------
+    theta, phi : float
+        Zenith and azimuth of the direction to the sun. [rad]
+    irradiance : float, (wavelengths, values) or callable, optional
+        Spectral irradiance above the atmosphere on a plane that faces the sun
+        [W m-2 um-1]. Without it the irradiance is 1 and radiances are relative to it.
+    optical_depth : float, (wavelengths, values) or callable
+        Of the atmosphere along the vertical: the direct light falls by
+        exp(-optical_depth / cos theta), which holds for zeniths up to about 80 degrees. [1]
+    half_angle : float
+        Angular radius of the disc, of uniform radiance. [rad]
+
+    Raises
+    ------
+    ValueError
+        If the sun is not above the horizon, or a value leaves its range.
+
+    Examples
+    --------
+    >>> sun = Sun(theta=np.pi / 3, irradiance=1000.0, optical_depth=0.1)
+    >>> round(sun.at_ground(0.55), 3)
+    818.731
+    """
+
+    theta: float
+    phi: float = 0.0
+    irradiance: Spectrum | None = None
+    optical_depth: Spectrum = 0.0
+    half_angle: float = HALF_ANGLE
+
+    def __post_init__(self) -> None:
+        one_number(
+            "theta", self.theta, lambda v: (v >= 0) & (v < pi / 2), "lie in [0, 1.571) rad",
+            "It is the sun's zenith in radians; below the horizon leave the sun out.",
+        )  # fmt: skip
+        one_number(
+            "phi", self.phi, lambda v: np.abs(v) <= 4 * pi, "lie in [-12.57, 12.57] rad",
+            "Angles are radians; use np.deg2rad.",
+        )  # fmt: skip
+        one_number(
+            "half_angle", self.half_angle, lambda v: (v > 0) & (v < 0.2),
+            "lie in (0, 0.2) rad", "That of the sun is 0.00465.",
+        )  # fmt: skip
+
+    @classmethod
+    def planck(
+        cls,
+        *,
+        theta: float,
+        phi: float = 0.0,
+        temperature: float = TEMPERATURE,
+        optical_depth: Spectrum = 0.0,
+    ) -> "Sun":
+        """Return a sun that is a black body of the sun's size; it has no spectral lines.
+
+        Examples
+        --------
+        >>> round(Sun.planck(theta=0.0).at_ground(0.55))
+        1749
+        """
+        solid_angle = pi * sin(HALF_ANGLE) ** 2
+
+        def irradiance(wavelength: float) -> float:
+            return float(black_body(wavelength, temperature)) * solid_angle
+
+        return cls(theta=theta, phi=phi, irradiance=irradiance, optical_depth=optical_depth)
+
+    @property
+    def relative(self) -> bool:
+        """Whether radiances are relative to the sun's irradiance."""
+        return self.irradiance is None
+
+    def above(self, wavelength: float | None) -> float:
+        """Irradiance above the atmosphere, facing the sun. [W m-2 um-1]"""
+        if self.irradiance is None:
+            return 1.0
+        return spectral("irradiance", self.irradiance, wavelength)
+
+    def at_ground(self, wavelength: float | None) -> float:
+        """Direct irradiance at the ground, facing the sun. [W m-2 um-1]"""
+        depth = spectral("optical_depth", self.optical_depth, wavelength)
+        return self.above(wavelength) * exp(-depth / cos(self.theta))
+
+    def disc(self, rings: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return zeniths, azimuths and weights (summing to 1) of points of the disc.
+
+        Gauss-Legendre in the square of the radius, so that weights are parts of its solid
+        angle, at eight angles each.
+        """
+        node, weight = np.polynomial.legendre.leggauss(rings)
+        radius = self.half_angle * np.sqrt(0.5 + 0.5 * node)
+        turn = (np.arange(8) + 0.5) * (pi / 4)
+        axis = direction(self.theta, self.phi)
+        south = direction(self.theta + pi / 2, self.phi)
+        east = np.array([-sin(self.phi), cos(self.phi), 0.0])
+        rim = np.cos(turn)[:, None] * south + np.sin(turn)[:, None] * east
+        points = (
+            np.cos(radius)[:, None, None] * axis + np.sin(radius)[:, None, None] * rim
+        ).reshape(-1, 3)
+        zenith = np.arctan2(np.hypot(points[:, 0], points[:, 1]), points[:, 2])
+        azimuth = np.arctan2(points[:, 1], points[:, 0])
+        return zenith, azimuth, np.repeat(weight / 16, 8)
