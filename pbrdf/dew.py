@@ -15,6 +15,7 @@ from pbrdf.optics.materials import Material
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.run import simulate
 from pbrdf.surface import Surface
+from pbrdf.tracer.arguments import isotropic
 
 DRY = "dry"
 # Directions this near to the specular one are its lobe, up to the second angle its skirt;
@@ -119,6 +120,8 @@ def compare_dew(  # noqa: PLR0913  (a scene, an amount and a run)
     one = whole.one_path / whole.projected_solid_angle
     stderr = _stderr(whole.brdf_runs).where(~dark, one)
     whole["brdf_stderr"] = stderr.transpose(*whole.brdf.dims)
+    # Drops are laid anew in every run, and the azimuth is averaged over
+    whole.attrs["isotropic"] = isotropic(surface)
     whole.attrs |= {"warnings": list(notes), "runs": runs, "seed": seed}
     return whole.drop_vars(["brdf_runs", "one_path"])
 
@@ -167,12 +170,34 @@ def signatures(result: xr.Dataset) -> xr.Dataset:
     stderr = np.where(dark, floors, stderr)
     # What is added to the dark has the error of both
     stderr[1, 1:] = np.where(dark[:1], np.hypot(stderr[1, 1:], floors[:1]), stderr[1, 1:])
+    _whole_peaks(value, stderr)
     dims = ("state", "theta_i", "region", "quantity")
     names = ("signature", "added")
     table = {name: (dims, value[k]) for k, name in enumerate(names)}
     table |= {f"{name}_stderr": (dims, stderr[k]) for k, name in enumerate(names)}
     coords = {"region": list(REGIONS), "quantity": list(QUANTITIES)}
     return xr.Dataset(table, coords)
+
+
+def _whole_peaks(value: np.ndarray, stderr: np.ndarray) -> None:
+    """Make the peak of the hemisphere that of the region that has it, in place.
+
+    The jackknife takes more from a peak that several bins compete for than from one alone,
+    and would put the peak of the whole below those of its parts.
+    """
+    for k, name in enumerate(QUANTITIES):
+        if not name.startswith("peak"):
+            continue
+        parts, errors = value[0, :, :, :-1, k], stderr[:, :, :, :-1, k]
+        best = np.where(np.isfinite(parts), parts, -np.inf).argmax(axis=-1)[..., None]
+        highest = np.take_along_axis(parts, best, -1)[..., 0]
+        error = np.take_along_axis(errors[0], best, -1)[..., 0]
+        value[0, :, :, -1, k], stderr[0, :, :, -1, k] = highest, error
+        value[1, :, :, -1, k] = highest - highest[:1]
+        # Of the same region the runs share their noise
+        common = np.take_along_axis(errors[1], best, -1)[..., 0]
+        apart = np.hypot(error, error[:1])
+        stderr[1, :, :, -1, k] = np.where(best[..., 0] == best[:1, :, 0], common, apart)
 
 
 QUANTITIES = ("M00", "M10", "|M20|", "P", "DOLP", "peak M00", "peak P")

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+import pbrdf.accessor  # noqa: F401  (registers ds.pbrdf)
 from data_io.reflectance.stored import FAULTS, check_stored, first_line
 from data_io.text.files import read_bytes
 from pbrdf.errors import DataFileError

@@ -9,8 +9,8 @@ import numpy as np
 
 from data_io import in_plane, write_model
 from fitting.models.cuts import plane_curves
-from fitting.report.figures import scan_figure
 from fitting.report.spectrum import spectrum_figure, spectrum_table
+from pbrdf.plots import scan_figure
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fitting.objective.parameters import PARAMETERS
-from fitting.report.figures import COLOURS, new_figure
+from pbrdf.plots import COLOURS, new_figure
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fitting.report.figures import COLOURS, new_figure
 from fitting.statistics.slopes import slope_distribution
+from pbrdf.plots import COLOURS, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +33,7 @@ def surface_figure(surface: Any, found: "SurfaceStatistics") -> "Figure":
     _draw_autocorrelation(axes[0, 2], found)
     if found.height_rms.value > 0:
         _draw_spectrum(axes[1, 0], found)
-        _draw_slopes(axes[1, 1], surface)
+        _draw_slopes(axes[1, 1], surface, found)
         _draw_bands(axes[1, 2], found)
     return figure
 
@@ -124,13 +124,16 @@ def _draw_spectrum(axis: "Axes", found: "SurfaceStatistics") -> None:
     axis.legend(frameon=False, fontsize="small")
 
 
-def _draw_slopes(axis: "Axes", surface: Any) -> None:
+def _draw_slopes(axis: "Axes", surface: Any, found: "SurfaceStatistics") -> None:
+    # The table holds the rms without noise and rounding
+    table = {one.axis: one.slope_rms.value for one in found.axes}
     slopes = slope_distribution(surface)
     middle = (slopes.edges[1:] + slopes.edges[:-1]) / 2
     for colour, (name, density) in zip(COLOURS, slopes.density.items(), strict=False):
         axis.errorbar(
             middle, density, slopes.stderr[name], color=colour, fmt=".", markersize=3,
-            elinewidth=0.8, label=f"along {name}, rms {slopes.rms[name]:.3g}",
+            elinewidth=0.8, label=f"along {name}, rms {slopes.rms[name]:.3g}, of the table "
+            f"{table.get(name, np.nan):.3g}",
         )  # fmt: skip
         gauss = np.exp(-0.5 * (middle / max(slopes.rms[name], 1e-12)) ** 2)
         axis.plot(

@@ -9,10 +9,10 @@ import xarray as xr
 import data_io
 from fitting.estimate import Estimate
 from fitting.report import html
-from fitting.report.figures import histogram_figure, scan_figure
 from fitting.report.fit_files import calibrated
 from fitting.result.misfit import RULE
 from pbrdf import __version__
+from pbrdf.plots import histograms, scan_figure
 
 if TYPE_CHECKING:
     from fitting.pipeline import PipelineResult
@@ -45,7 +45,7 @@ def write_report(
         What it takes to repeat the run, see `fitting.report.record`.
     """
     figures = {
-        "surface.png": html.png(histogram_figure(_histograms(result))),
+        "surface.png": html.png(histograms(result.statistics.histograms())),
         "scan.png": html.png(
             scan_figure(data_io.in_plane(_in_units(result)), result.curves)
         ),
@@ -103,11 +103,6 @@ def fit_columns(result: "PipelineResult") -> "dict[str, FitResult]":
     if result.scan_slope is not None:
         fits["Monte Carlo, slope from the scan alone"] = result.scan_slope
     return fits
-
-
-def _histograms(result: "PipelineResult") -> list:
-    statistics = result.statistics
-    return [statistics.height_histogram(), statistics.slope_histogram()]
 
 
 def _notes(result: "PipelineResult", record: Mapping[str, Any] | None) -> dict[str, object]:

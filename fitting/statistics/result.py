@@ -1,7 +1,7 @@
 """What surface statistics are: numbers with intervals, curves, warnings, tables."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -158,6 +158,20 @@ class SurfaceStatistics:
         return make_histogram(
             rise / lag, chosen.slope_rms.value, lag=lag, quantity="slope", units="1"
         )
+
+    def histograms(self) -> list[Histogram]:
+        """Histogram of the heights and of the slopes along each axis.
+
+        Each Gaussian has the rms that the table of estimates names for it.
+        """
+        axes = [axis.axis for axis in self.axes]
+        slopes = [self.slope_histogram(axis) for axis in axes]
+        if len(axes) > 1:
+            slopes = [
+                replace(one, quantity=f"slope along {axis}")
+                for one, axis in zip(slopes, axes, strict=True)
+            ]
+        return [self.height_histogram(), *slopes]
 
     def psd(self, axis: str = "x") -> PowerSpectrum:
         """One-sided power spectrum along an axis, measured and fitted."""

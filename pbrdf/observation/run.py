@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+import pbrdf.accessor  # noqa: F401  (registers ds.pbrdf)
 from pbrdf._version import __version__
 from pbrdf.analytic.geometry import flat_geometry
 from pbrdf.errors import AccuracyWarning

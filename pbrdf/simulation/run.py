@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+import pbrdf.accessor  # noqa: F401  (registers ds.pbrdf)
 from pbrdf.contaminants import Film
 from pbrdf.contaminants.arguments import material_of
 from pbrdf.errors import AccuracyWarning

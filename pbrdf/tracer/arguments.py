@@ -241,7 +241,7 @@ def mirrored(fold: bool, scene: Scene, phi_i: npt.ArrayLike | str) -> bool:
     """Return `fold`, refused where the mean is not its own mirror image."""
     symmetric = (
         isinstance(phi_i, str)
-        and _isotropic(scene.surface)
+        and isotropic(scene.surface)
         and not any(_pinned(one) for one in scene.contaminants)
     )
     if fold and not symmetric:
@@ -262,7 +262,7 @@ def _pinned(contaminant: Contamination) -> bool:
     )
 
 
-def _isotropic(surface: Surface) -> bool:
+def isotropic(surface: Surface) -> bool:
     """Whether a surface is its own mirror image in the mean over azimuth."""
     if isinstance(surface, HeightMap):
         return surface.labels is None and not np.ptp(surface.heights)

@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 
 from pbrdf import GaussianSurface, Material
-from pbrdf.cli.dew_figures import COLOURS
 from pbrdf.cli.predicting.dew import rows
 from pbrdf.dew import REGIONS, compare_dew
+from pbrdf.plots import COLOURS
 
 HERE = Path(__file__).parent
 SURFACE = GaussianSurface(shape=(512, 512), spacing=2.0, corr_length=30.0, slope_rms=0.05)

@@ -7,9 +7,9 @@ from time import perf_counter
 import numpy as np
 
 from pbrdf import GaussianSurface, Material
-from pbrdf.cli.dew_figures import polar_figure
 from pbrdf.cli.predicting.dew import table
 from pbrdf.dew import compare_dew
+from pbrdf.plots import hemisphere
 
 HERE = Path(__file__).parent
 SURFACE = GaussianSurface(shape=(512, 512), spacing=2.0, corr_length=30.0, slope_rms=0.05)
@@ -72,7 +72,8 @@ def main() -> None:
     print("hemispherical error of M00, percent:", (100 * error).round(2).values.tolist())
     print(f"{perf_counter() - begin:.0f} s")
     for number, theta_i in enumerate(INCIDENCE):
-        polar_figure(result, number).savefig(HERE / f"figure10_{theta_i:g}deg.png", dpi=80)
+        sheet = hemisphere(result.isel(theta_i=number), ("M00", "M10", "M20"))
+        sheet.savefig(HERE / f"figure10_{theta_i:g}deg.png", dpi=160)
     in_plane_figure(result, HERE / "in_plane.png")
 
 

@@ -16,10 +16,10 @@ import xarray as xr
 import data_io
 from fitting.models.cuts import plane_curves
 from fitting.pipeline import PipelineResult, run_pipeline
-from fitting.report.figures import new_figure, scan_figure
 from fitting.result.fit_result import FitResult
 from fitting.run import fit
 from pbrdf import Material, MicrofacetModel
+from pbrdf.plots import new_figure, scan_figure
 
 HERE = Path(__file__).parent
 # Step of both maps; the file names none [um]

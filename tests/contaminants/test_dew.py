@@ -72,6 +72,15 @@ def test_a_region_without_rays_has_the_error_of_one(result):
     assert float(dark.signature_stderr.sel(quantity="DOLP")) == 1.0
 
 
+def test_the_peak_of_the_whole_is_that_of_a_part(result):
+    for name in ("peak M00", "peak P"):
+        peak = result.signature.sel(quantity=name)
+        parts = peak.sel(region=["lobe", "skirt", "wings"]).max("region")
+        assert_allclose(peak.sel(region="hemisphere"), parts)
+        added = result.added.sel(quantity=name, region="hemisphere")
+        assert_allclose(added, peak.sel(region="hemisphere") - parts.isel(state=0))
+
+
 def test_jackknife_takes_the_bias_out_of_a_square():
     # Known bias: E[mean²] = μ² + σ²/n; over many samples the jackknife has none
     rng = np.random.default_rng(3)

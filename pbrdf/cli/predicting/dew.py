@@ -155,7 +155,9 @@ def _write_tables_and_figures(results: "list[xr.Dataset]", stage: Path) -> None:
     """Write dew.csv, and the figures of each wavelength."""
     import numpy as np
 
-    from pbrdf.cli.dew_figures import polar_figure, signature_figure
+    from pbrdf.cli.dew_figures import signature_figure
+    from pbrdf.dew import DRY
+    from pbrdf.plots import hemisphere
 
     with (stage / "dew.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
@@ -165,7 +167,9 @@ def _write_tables_and_figures(results: "list[xr.Dataset]", stage: Path) -> None:
         place = "" if len(results) == 1 else f"_{float(result.wavelength):g}um"
         for number, angle in enumerate(result.theta_i.values):
             name = f"hemisphere_{np.rad2deg(angle):.3g}deg{place}.png"
-            polar_figure(result, number).savefig(stage / name, dpi=110)
+            hemisphere(
+                result.isel(theta_i=number), ("M00", "M10", "M20", "DOLP"), minus=DRY
+            ).savefig(stage / name, dpi=200)
         signature_figure(result).savefig(stage / f"polarised{place}.png", dpi=130)
 
 

@@ -1,7 +1,7 @@
 """`pbrdf plot`: a scan, or a simulated hemisphere, as a figure."""
 
 import math
-from collections.abc import Mapping
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +12,14 @@ from pbrdf.cli import declaring, options
 if TYPE_CHECKING:
     import xarray as xr
 
-HEMISPHERE = ("theta_i", "theta_s", "dphi", "stokes_out", "stokes_in")
+
+class Scale(StrEnum):
+    """Of the colours of Mueller elements."""
+
+    auto = "auto"
+    linear = "linear"
+    log = "log"
+    symlog = "symlog"
 
 
 def command(
@@ -23,11 +30,15 @@ def command(
     output: options.Output = None,
     force: options.Force = False,
     theta_i: Annotated[
-        float,
+        float | None,
         typer.Option(
-            "--theta-i-deg", min=0.0, max=90.0, help="Incidence of a result to draw."
+            "--theta-i-deg",
+            min=0.0,
+            max=90.0,
+            help="Incidence of a result to draw, one "
+            "that was computed; the first without it.",
         ),
-    ] = 30.0,
+    ] = None,
     wavelength: options.Wavelength = None,
     columns: declaring.ScanColumns = None,
     azimuth_of_forward: declaring.Forward = None,
@@ -38,34 +49,53 @@ def command(
         list[str] | None,
         typer.Option(
             help="NAME=VALUE where a result has more dimensions, as phi_i_deg=90 or what "
-            "a sweep varied; the nearest is drawn."
+            "a sweep varied, one that was computed."
         ),
+    ] = None,
+    elements: Annotated[
+        str, typer.Option(help="By commas: M00 ... M33, DOLP, AOLP.")
+    ] = "M00,M10,M20,DOLP",
+    scale: Annotated[Scale, typer.Option(help="Of the colours of M00 ... M33.")] = (
+        Scale.auto
+    ),
+    width_mm: Annotated[
+        float, typer.Option(min=60.0, max=1000.0, help="Printed width, 85 or 170 [mm].")
+    ] = 170.0,
+    errors: Annotated[
+        bool, typer.Option("--errors", help="Add panels of the standard errors.")
+    ] = False,
+    plane: Annotated[
+        bool, typer.Option("--in-plane", help="Draw the cut in the plane of incidence.")
+    ] = False,
+    minus: Annotated[
+        str | None,
+        typer.Option(help="Of a dew result: add the other states minus this one, as dry."),
     ] = None,
 ) -> None:
     """Draw M00, M10 and polarisation: a scan in plane, a result over the hemisphere.
 
     Example: pbrdf plot result.nc --theta-i-deg 60 -o result.png
     """
-    import numpy as np
-
     import data_io
-    from fitting.report.figures import hemisphere_figure, scan_figure
     from pbrdf.cli.reading import read_scan
     from pbrdf.cli.staging import staged_file
+    from pbrdf.plots import hemisphere, plane_cuts, scan_figure
 
     target = output or source.with_suffix(".png")
     with staged_file(target, force=force) as stage:
         if source.suffix == ".nc":
             result = data_io.read_result(source)
-            if "brdf_total" not in result:
-                msg = (
-                    f"{source.name} must hold brdf_total, got {list(result.data_vars)[:5]}."
+            places = _places(result, theta_i, wavelength, at, one=not plane)
+            names = options.names(elements)
+            if plane:
+                figure = plane_cuts(
+                    result, names, scale=scale.value, width_mm=width_mm, places=places
                 )
-                raise ValueError(msg)
-            places = dict(_place(text) for text in at or ())
-            if wavelength is not None and "wavelength" in result.dims:
-                places["wavelength"] = wavelength
-            figure = hemisphere_figure(_cut(result, places), float(np.deg2rad(theta_i)))
+            else:
+                figure = hemisphere(
+                    result, names, errors=errors, minus=minus, scale=scale.value,
+                    width_mm=width_mm, places=places,
+                )  # fmt: skip
         else:
             declared = declaring.declarations(
                 columns, azimuth_of_forward, angles, quantity, normalised
@@ -77,7 +107,7 @@ def command(
                 msg = f"{source.name} must have rows in the plane of incidence, got none."
                 raise ValueError(msg)
             figure = scan_figure(scan)
-        figure.savefig(stage, dpi=140)
+        figure.savefig(stage, dpi=200)
     typer.echo(f"Figure: {target}")
 
 
@@ -92,14 +122,40 @@ def _place(text: str) -> tuple[str, float]:
     return ("phi_i", math.radians(number)) if name == "phi_i_deg" else (name, number)
 
 
-def _cut(result: "xr.Dataset", places: Mapping[str, float]) -> "xr.Dataset":
-    """Cut a result at these places, which must leave one hemisphere an incidence."""
-    further = [str(name) for name in result.brdf_total.dims if name not in HEMISPHERE]
-    if set(further) != set(places):
+def _places(
+    result: "xr.Dataset",
+    theta_i: float | None,
+    wavelength: float | None,
+    at: "list[str] | None",
+    *,
+    one: bool,
+) -> dict[str, float]:
+    """Return where to cut; of one hemisphere each dimension needs a place."""
+    from pbrdf.derived.elements import mueller
+
+    value, _ = mueller(result)
+    places = dict(_place(text) for text in at or ())
+    if theta_i is not None:
+        places["theta_i"] = math.radians(theta_i)
+    elif one and "theta_i" in value.dims:
+        places["theta_i"] = float(result.theta_i.values[0])
+    if wavelength is not None:
+        if "wavelength" not in result.coords:
+            msg = (
+                "--wavelength-um must be left out, the result names no wavelength, got "
+                f"{wavelength:g}."
+            )
+            raise ValueError(msg)
+        places["wavelength"] = wavelength
+    own = ("theta_i", "theta_s", "dphi", "stokes_out", "stokes_in", "state")
+    further = [str(d) for d in value.dims if d not in own and value.sizes[d] > 1]
+    lacking = [name for name in further if name not in places] if one else []
+    strange = [name for name in places if name not in result.coords]
+    if lacking or strange:
         named = ["phi_i_deg" if name == "phi_i" else name for name in further]
         msg = (
             "--at must be given once for each further dimension of the result, "
             f"{', '.join(named) or 'here none'}, got {', '.join(places) or 'none'}."
         )
         raise ValueError(msg)
-    return result.sel(places, method="nearest")
+    return places

@@ -1,0 +1,16 @@
+"""What follows from a result: elements, polarisation, cuts, places between."""
+
+from pbrdf.derived.elements import NAMES, Element, element, folded, light
+from pbrdf.derived.places import choose, interpolate
+from pbrdf.derived.plane import in_plane
+
+__all__ = [
+    "NAMES",
+    "Element",
+    "choose",
+    "element",
+    "folded",
+    "in_plane",
+    "interpolate",
+    "light",
+]

@@ -1,0 +1,117 @@
+"""Cuts of a result in the plane of incidence, with bands of two standard errors."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from pbrdf.derived.elements import element, mueller
+from pbrdf.derived.places import choose, in_words
+from pbrdf.derived.plane import in_plane
+from pbrdf.plots.sheet import COLOURS, new_figure, scene_of, small, width
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["plane_cuts"]
+
+_CURVES = ("theta_view", "stokes_out", "stokes_in")
+
+
+def plane_cuts(
+    result: xr.Dataset,
+    elements: Sequence[str] = ("M00", "M10", "DOLP"),
+    *,
+    scale: str = "auto",
+    width_mm: float = 170.0,
+    places: Mapping[str, Any] | None = None,
+    **further: Any,
+) -> "Figure":
+    """Draw elements in the plane of incidence against view angle, forward to the right.
+
+    Every incidence, wavelength and state that is not chosen is a curve. Bands are two
+    standard errors; a line breaks where nothing is known.
+
+    Parameters
+    ----------
+    result : Dataset
+        Of `simulate` or `compare_dew`.
+    elements, scale, width_mm, places
+        As of `hemisphere`.
+    """
+    from matplotlib import rc_context
+
+    here = choose(result, {**(places or {}), **further})
+    cut = in_plane(here)
+    curves = [str(d) for d in mueller(cut)[0].dims if d not in _CURVES]
+    view = np.rad2deg(cut.theta_view.values)
+    with rc_context(small()):
+        inches = width(width_mm)
+        columns = min(len(elements), 3 if inches > 4.5 else 1)
+        rows = -(-len(elements) // columns)
+        figure, axes = new_figure(rows, columns, (inches, 2.1 * rows + 0.6))
+        for axis in axes.flat[len(elements) :]:
+            axis.set_visible(False)
+        for axis, name in zip(axes.flat, elements, strict=False):
+            found = element(cut, name)
+            factor = 180 / np.pi if name == "AOLP" else 1.0
+            order = (*curves, "theta_view")
+            value = factor * found.value.transpose(*order).values
+            error = None
+            if found.stderr is not None:
+                error = factor * found.stderr.transpose(*order).values
+            for k, place in enumerate(np.ndindex(value.shape[:-1])):
+                label = ", ".join(
+                    in_words(d, cut[d].values[i])
+                    for d, i in zip(curves, place, strict=True)
+                )
+                colour = COLOURS[k % len(COLOURS)]
+                style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
+                axis.plot(view, value[place], style, color=colour, lw=1.0, label=label)
+                if error is not None:
+                    axis.fill_between(
+                        view, value[place] - 2 * error[place],
+                        value[place] + 2 * error[place], color=colour, alpha=0.22, lw=0,
+                    )  # fmt: skip
+            _scaled(axis, name, value, scale)
+            unit = {"DOLP": "1", "AOLP": "deg"}.get(name, "1/sr")
+            axis.set_title(f"{name} [{unit}]")
+            axis.set(xlim=(-90, 90), xticks=range(-90, 91, 30), xlabel="view angle [deg]")
+        handles, labels = axes.flat[0].get_legend_handles_labels()
+        if len(labels) > 1:
+            figure.legend(
+                handles, labels, loc="outside lower center", ncols=4 if inches > 4.5 else 2,
+                frameon=False, title=" and ".join(curves),
+            )  # fmt: skip
+        chosen = [
+            f"{name} {in_words(str(name), here[name].values)}"
+            for name in ("theta_i", "wavelength", "phi_i", "state")
+            if name in here.coords and here[name].ndim == 0
+        ]
+        note = "plane of incidence, + forward; bands: 2 standard errors"
+        lines = [", ".join(chosen), scene_of(here), note]
+        figure.suptitle("\n".join(line for line in lines if line))
+    return figure
+
+
+def _scaled(axis: Any, name: str, value: np.ndarray, scale: str) -> None:
+    """Set the scale of the ordinate."""
+    lit = np.abs(value[np.isfinite(value) & (value != 0)])
+    if not lit.size:
+        return
+    if name == "DOLP":
+        axis.set_ylim(-0.02, min(1.05, 1.15 * float(np.percentile(lit, 98)) + 0.02))
+        return
+    if name == "AOLP":
+        axis.set(ylim=(-95, 95), yticks=range(-90, 91, 45))
+        return
+    top = float(lit.max())
+    if scale == "auto":
+        wide = top > 30 * np.median(lit)
+        scale = "linear" if not wide else "log" if name == "M00" else "symlog"
+    if scale == "log" and np.nanmin(value) >= 0:
+        axis.set_yscale("log")
+        axis.set_ylim(max(float(lit.min()) / 2, top / 1e6), 2 * top)
+    elif scale in ("symlog", "log"):
+        axis.set_yscale("symlog", linthresh=top / 1e3)

@@ -1,0 +1,317 @@
+"""The hemisphere in polar plots: forward to the right, the source on the left."""
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from pbrdf.derived.elements import Element, element, folded, mueller
+from pbrdf.derived.places import choose, in_words
+from pbrdf.plots.limits import look_of
+from pbrdf.plots.sheet import halo, scene_of, small, title_of, width
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["hemisphere"]
+
+_BINS = ("theta_s", "dphi", "stokes_out", "stokes_in")
+# Width over height of a panel with its colour bar
+_SHAPE = 0.80
+# Narrowest panel whose labels do not run into each other [in]
+_LEAST = 40.0 / 25.4
+_Panel = tuple[str, str, np.ndarray, np.ndarray | None]
+
+
+def hemisphere(
+    result: xr.Dataset,
+    elements: Sequence[str] = ("M00", "M10", "DOLP"),
+    *,
+    errors: bool = False,
+    minus: Hashable | None = None,
+    scale: str = "auto",
+    fold: bool = True,
+    width_mm: float = 170.0,
+    places: Mapping[str, Any] | None = None,
+    **further: Any,
+) -> "Figure":
+    """Draw elements of a result over the hemisphere.
+
+    Cells that are smaller than two standard errors are hatched; cells of which nothing is
+    known are grey. The largest value that is known to a fifth of itself sets the scale.
+
+    Parameters
+    ----------
+    result : Dataset
+        Of `simulate` or `compare_dew`; a comparison is drawn with a column a state.
+    elements : sequence of str
+        M00 ... M33, DOLP, AOLP.
+    errors : bool
+        Add a panel with the standard error of each.
+    minus : str, optional
+        Of a comparison: add rows of every other state minus this one, as "dry".
+    scale : {"auto", "linear", "log", "symlog"}
+        Of the colours of M00 ... M33; auto is logarithmic where decades are spanned.
+    fold : bool
+        Average with the mirror image where the scene is isotropic; the title says so.
+    width_mm : float
+        Width that the figure is printed at, 85 or 170; letters stay 7 pt. [mm]
+    places : mapping, optional
+        theta_i [rad], wavelength [um] and further dimensions, as computed. Also as
+        keyword arguments.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    ValueError
+        If a place was not computed, or must be chosen and is not.
+    """
+    from matplotlib import rc_context
+
+    here = choose(result, {**(places or {}), **further})
+    value, _ = mueller(here)
+    open_ends = [d for d in value.dims if d not in (*_BINS, "state")]
+    for name in [d for d in open_ends if value.sizes[d] == 1]:
+        here = here.isel({name: 0})
+        open_ends.remove(name)
+    if open_ends:
+        listed = "; ".join(
+            f"{d} of {', '.join(in_words(str(d), v) for v in result[d].values)}"
+            for d in open_ends
+        )
+        msg = f"a hemisphere must be chosen by {listed}."
+        raise ValueError(msg)
+    here, mirrored = folded(here) if fold else (here, False)
+    rows = _rows(here, elements, errors, minus)
+    inches = width(width_mm)
+    if "state" not in mueller(here)[0].dims:
+        # No narrower than labels need
+        fit = max(1, int(inches / _LEAST))
+        rows = [row[k : k + fit] for k in range(0, len(rows[0]), fit) for row in rows]
+    columns = max(len(row) for row in rows)
+    with rc_context(small()):
+        figure = _drawn(here, rows, columns, inches, scale)
+        note = "★ source   + specular   hatched: below 2 standard errors"
+        heading = "\n".join(
+            line
+            for line in (
+                title_of(here) + (", folded about the plane" if mirrored else ""),
+                scene_of(here),
+                note if inches > 4.5 else note.replace("   hatched", "\nhatched"),
+            )
+            if line
+        )
+        figure.suptitle(heading)
+        figure.draw_without_rendering()
+    return figure
+
+
+def _rows(
+    here: xr.Dataset, elements: Sequence[str], errors: bool, minus: Hashable | None
+) -> list[list[_Panel]]:
+    """Panels (name, title, values, errors), row by row."""
+    found = {name: element(here, name) for name in elements}
+    if "state" not in mueller(here)[0].dims:
+        if minus is not None:
+            msg = f"minus must be left out of a result without states, got {minus!r}."
+            raise ValueError(msg)
+        rows = [[_panel(name, name, one) for name, one in found.items()]]
+        if errors:
+            rows.append([_error_panel(n, f"error of {n}", one) for n, one in found.items()])
+        return rows
+    states = [str(s) for s in here.state.values]
+    rows = []
+    for name, one in found.items():
+        parts = {s: _at(one, state=s) for s in states}
+        rows.append([_panel(name, f"{name}, {s}", p) for s, p in parts.items()])
+        if errors:
+            rows.append(
+                [_error_panel(name, f"error of {name}, {s}", p) for s, p in parts.items()]
+            )
+        if minus is not None:
+            if minus not in parts:
+                msg = f"minus must be one of {', '.join(states)}, got {minus!r}."
+                raise ValueError(msg)
+            base = parts[str(minus)]
+            rows.append(
+                [
+                    _panel("difference", f"{name}, {s} minus {minus}", _difference(p, base))
+                    for s, p in parts.items()
+                    if s != minus
+                ]
+            )
+    return rows
+
+
+def _at(one: Element, **place: Any) -> Element:
+    error = None if one.stderr is None else one.stderr.sel(place)
+    return Element(one.value.sel(place), error)
+
+
+def _difference(one: Element, base: Element) -> Element:
+    """Subtract; errors are taken as independent, which common surfaces make too large."""
+    error: Any = None
+    if one.stderr is not None and base.stderr is not None:
+        error = np.hypot(one.stderr, base.stderr)
+    return Element((one.value - base.value).assign_attrs(one.value.attrs), error)
+
+
+def _panel(name: str, title: str, one: Element) -> _Panel:
+    value = one.value.transpose("theta_s", "dphi").values
+    error = None if one.stderr is None else one.stderr.transpose("theta_s", "dphi").values
+    if one.value.attrs.get("units") == "rad":
+        value = np.rad2deg(value)
+        error = None if error is None else np.rad2deg(error)
+    unit = {"sr-1": "1/sr", "rad": "deg"}.get(str(one.value.attrs["units"]), "1")
+    return name, f"{title} [{unit}]", value, error
+
+
+def _error_panel(name: str, title: str, one: Element) -> _Panel:
+    if one.stderr is None:
+        msg = f"the result holds no errors of {name}. Leave errors out."
+        raise ValueError(msg)
+    _, heading, _, error = _panel(name, title, one)
+    assert error is not None
+    return f"error of {name}", heading, error, None
+
+
+def _drawn(
+    here: xr.Dataset, rows: list[list[_Panel]], columns: int, inches: float, scale: str
+) -> "Figure":
+    from matplotlib.figure import Figure
+
+    side = inches / columns
+    figure = Figure(
+        figsize=(inches, side / _SHAPE * len(rows) + 0.55), layout="constrained"
+    )
+    shared = _shared_looks(rows, scale)
+    for number, row in enumerate(rows):
+        offset = (
+            columns - len(row) if len(rows) > 1 and number and len(row) < columns else 0
+        )
+        offset = offset if row[0][0] == "difference" else 0
+        for place, (panel, look) in enumerate(zip(row, shared[number], strict=True)):
+            at = number * columns + place + offset + 1
+            axis = figure.add_subplot(len(rows), columns, at, projection="polar")
+            _draw(figure, axis, here, panel, look)
+    return figure
+
+
+def _shared_looks(rows: list[list[_Panel]], scale: str) -> list[list[Any]]:
+    """Panels of a row that show one element share limits and colours."""
+    looks = []
+    for row in rows:
+        if len({name for name, *_ in row}) > 1 or len(row) == 1:
+            looks.append([look_of(n, v, e, scale) for n, _, v, e in row])
+            continue
+        values = np.stack([v for _, _, v, _ in row])
+        kept = [e for *_, e in row if e is not None]
+        error = np.stack(kept) if len(kept) == len(row) else None
+        looks.append([look_of(row[0][0], values, error, scale)] * len(row))
+    return looks
+
+
+def _draw(figure: "Figure", axis: Any, here: xr.Dataset, panel: _Panel, look: Any) -> None:
+    """Draw one hemisphere, its marks, labels and colour bar."""
+    name, title, values, error = panel
+    norm, colours, bar_options = look
+    n_theta, n_dphi = values.shape
+    zenith = np.linspace(0.0, 90.0, n_theta + 1)
+    # Bins are centred on dphi = 0, which is drawn to the left
+    azimuth = (np.arange(n_dphi + 1) - 0.5) * 2 * np.pi / n_dphi + np.pi
+    axis.set_facecolor("0.85")
+    axis.grid(visible=False)
+    image = axis.pcolormesh(
+        azimuth, zenith, np.ma.masked_invalid(values), norm=norm, cmap=colours,
+        rasterized=True,
+    )  # fmt: skip
+    if error is not None and name != "AOLP":
+        unsure = np.isfinite(values) & ~(np.abs(values) >= 2 * error)
+    elif error is not None:
+        unsure = np.isfinite(values) & ~(error < 15.0)
+    else:
+        unsure = np.zeros(values.shape, bool)
+    if unsure.any():
+        _hatch(axis, azimuth, zenith, unsure)
+    axis.set_ylim(0.0, 90.0)
+    axis.set_yticks([30, 60, 90], labels=[])
+    axis.set_xticks(np.deg2rad([0, 90, 180, 270]), labels=["180°", "270°", "0°", "90°"])
+    axis.tick_params(axis="x", pad=-1.5)
+    axis.grid(visible=True, color="white", linewidth=0.9, alpha=0.7)
+    for ring in (30, 60):
+        axis.plot(
+            np.linspace(0, 2 * np.pi, 181), np.full(181, ring), color="black",
+            linewidth=0.35, zorder=3,
+        )  # fmt: skip
+        axis.text(
+            np.deg2rad(68), ring, f"{ring}°", ha="center", va="center", zorder=6,
+            path_effects=halo(),
+        )  # fmt: skip
+    zenith_i = float(np.rad2deg(here.theta_i))
+    axis.plot(
+        np.pi, zenith_i, "*", color="black", markersize=5.5, zorder=7,
+        path_effects=halo(), clip_on=False,
+    )  # fmt: skip
+    axis.plot(
+        0.0, zenith_i, "+", color="black", markersize=6, mew=1.1, zorder=7,
+        path_effects=halo(), clip_on=False,
+    )  # fmt: skip
+    axis.set_title(title, pad=3)
+    bar = figure.colorbar(
+        image, ax=axis, location="bottom", shrink=0.86, aspect=22, pad=0.03, **bar_options
+    )
+    bar.outline.set_linewidth(0.4)
+    _few_ticks(bar, norm, "ticks" in bar_options and name != "AOLP")
+
+
+def _hatch(axis: Any, azimuth: np.ndarray, zenith: np.ndarray, cells: np.ndarray) -> None:
+    """Hatch some cells of the hemisphere."""
+    from matplotlib.collections import PolyCollection
+
+    ring, sector = np.nonzero(cells)
+    corners = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    outline = np.stack(
+        [
+            np.stack([azimuth[sector + across], zenith[ring + out]], axis=-1)
+            for out, across in corners
+        ],
+        axis=1,
+    )
+    axis.add_collection(
+        PolyCollection(
+            list(outline), facecolor="none", edgecolor="0.35", linewidth=0,
+            hatch="//////", zorder=2,
+        )
+    )  # fmt: skip
+
+
+def _few_ticks(bar: Any, norm: Any, symmetric: bool) -> None:
+    """Keep as many ticks as fit below a panel of a journal's column."""
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+
+    def power(value: float, _: object) -> str:
+        if value == 0:
+            return "0"
+        exponent = int(np.round(np.log10(abs(value))))
+        return f"${'-' if value < 0 else ''}10^{{{exponent}}}$"
+
+    if symmetric:
+        positive = [t for t in bar.get_ticks() if t >= norm.linthresh][-1:]
+        kept = sorted({0.0, *positive, *([-t for t in positive] if norm.vmin < 0 else [])})
+        bar.set_ticks(kept)
+        bar.formatter = FuncFormatter(power)
+        bar.update_ticks()
+    elif isinstance(norm, LogNorm):
+        bar.locator = LogLocator(numticks=3)
+        bar.formatter = FuncFormatter(power)
+        bar.update_ticks()
+    elif norm.vmax != 90.0:
+        bar.locator = MaxNLocator(3)
+        bar.update_ticks()
+        bar.formatter.set_powerlimits((-3, 4))
+    bar.ax.xaxis.set_minor_locator(NullLocator())

@@ -1,0 +1,107 @@
+"""The sheet of a figure: its width, its letters, its colours, what stands in its title."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["COLOURS", "WIDTHS", "halo", "new_figure", "small", "title_of"]
+
+# Colours that stay apart in print and for colour-blind eyes (Okabe and Ito)
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+# One and two columns of a journal [mm]
+WIDTHS = (85.0, 170.0)
+MM = 1 / 25.4
+# Letters at the size that is printed [pt]
+SIZE = 7.5
+
+
+def new_figure(
+    rows: int, columns: int, size: tuple[float, float], **options: Any
+) -> "tuple[Figure, Any]":
+    """Return a figure that belongs to no window system, and its axes as a 2-D array."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False, **options)
+    for axis in axes.flat:
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.grid(alpha=0.25, linewidth=0.6)
+    return figure, axes
+
+
+def width(width_mm: float) -> float:
+    """Return the width of a figure [in].
+
+    Raises
+    ------
+    ValueError
+        If it is none that can be read or printed.
+    """
+    if not 60.0 <= width_mm <= 1000.0:
+        msg = f"width_mm must lie in [60, 1000] mm, 85 and 170 are usual, got {width_mm:g}."
+        raise ValueError(msg)
+    return width_mm * MM
+
+
+def small() -> Any:
+    """Return settings of letters and lines for a figure printed at its own size."""
+    return {
+        "font.size": SIZE, "axes.titlesize": SIZE, "axes.labelsize": SIZE,
+        "xtick.labelsize": SIZE - 0.5, "ytick.labelsize": SIZE - 0.5,
+        "legend.fontsize": SIZE - 0.5, "figure.titlesize": SIZE + 0.5,
+        "axes.linewidth": 0.6, "hatch.linewidth": 0.35, "pdf.fonttype": 42,
+        "svg.fonttype": "none",
+    }  # fmt: skip
+
+
+def halo(colour: str = "white", linewidth: float = 1.8) -> list[Any]:
+    """Path effects that keep letters and marks readable on any colour."""
+    from matplotlib import patheffects
+
+    return [patheffects.withStroke(linewidth=linewidth, foreground=colour)]
+
+
+def title_of(result: xr.Dataset, *, also: Mapping[str, str] | None = None) -> str:
+    """Name incidence, wavelength, further places and the scene of one hemisphere."""
+    parts = []
+    if "theta_i" in result.coords and result.theta_i.ndim == 0:
+        parts.append(f"incidence {np.rad2deg(float(result.theta_i)):.4g}°")
+    if "wavelength" in result.coords and result.wavelength.ndim == 0:
+        parts.append(f"{float(result.wavelength):.4g} µm")
+    else:
+        parts += [] if "wavelength" in result.dims else ["wavelength not given"]
+    parts += [f"{name} {value}" for name, value in (also or {}).items()]
+    return ", ".join(parts)
+
+
+def scene_of(result: xr.Dataset) -> str:
+    """Describe the scene of a result in a line, empty where it is not recorded."""
+    import tomllib
+
+    try:
+        scene = tomllib.loads(str(result.attrs.get("scene", "")))
+    except tomllib.TOMLDecodeError:
+        return ""
+    parts = []
+    surface = scene.get("surface", {})
+    if surface:
+        words = [f"{surface.get('type', 'surface')} surface"]
+        if isinstance(surface.get("slope_rms"), float):
+            words.append(f"slope {surface['slope_rms']:.3g}")
+        parts.append(" ".join(words))
+    substrate = scene.get("substrate", {})
+    if isinstance(substrate, dict) and isinstance(substrate.get("n"), int | float):
+        index = f"n {substrate['n']:.4g}"
+        if substrate.get("kappa"):
+            index += f" + {substrate['kappa']:.3g}i"
+        name = substrate.get("name")
+        parts.append(f"{name} ({index})" if name else index)
+    for one in scene.get("contaminants", scene.get("contaminant", [])):
+        if isinstance(one, dict):
+            parts.append(str(one.get("type", "contaminant")))
+    return ", ".join(parts)

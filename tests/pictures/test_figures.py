@@ -1,0 +1,186 @@
+"""Figures as they are drawn: where things stand, what sets the scale, what is not drawn."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from numpy.testing import assert_allclose
+
+from data_io import write_result
+from pbrdf.cli import main
+from pbrdf.plots import hemisphere, plane_cuts, scan_figure
+from pbrdf.plots.limits import reach_of
+from pbrdf.plots.scans import residuals
+from tests.pictures.results import hand_made
+
+
+def words_of(figure) -> str:
+    texts = figure.findobj(lambda artist: hasattr(artist, "get_text"))
+    return "\n".join(text.get_text() for text in texts)
+
+
+def test_forward_is_right_and_the_source_left():
+    result = hand_made().isel(wavelength=0)
+    result.brdf_total[:] = 0.01
+    # One bright cell: dphi = pi, second ring
+    result.brdf_total[1, 1, 4, 0, 0] = 5.0
+    figure = hemisphere(result, ("M00",), theta_i=0.9)
+    axis = figure.axes[0]
+    mesh = next(one for one in axis.collections if one.get_array() is not None)
+    bright = int(np.argmax(mesh.get_array()))
+    # Corners of that cell on the sheet, from the axis's own projection
+    corners = mesh.get_coordinates()[
+        bright // 8 : bright // 8 + 2, bright % 8 : bright % 8 + 2
+    ]
+    x = axis.transData.transform(corners.reshape(-1, 2))[:, 0].mean()
+    centre = axis.transData.transform((0.0, 0.0))[0]
+    assert x > centre
+    star, plus = (
+        next(line for line in axis.lines if line.get_marker() == marker) for marker in "*+"
+    )
+    places = [axis.transData.transform(line.get_xydata())[0, 0] for line in (star, plus)]
+    assert places[0] < centre < places[1]
+    assert_allclose([star.get_ydata()[0], plus.get_ydata()[0]], np.rad2deg(0.9))
+    words = words_of(figure)
+    assert "incidence 51.57°, 0.45 µm" in words
+    assert "★ source" in words
+
+
+def test_a_noisy_rim_cell_does_not_set_the_scale():
+    value, error = np.full((5, 8), 0.3), np.full((5, 8), 0.01)
+    value[2, 4] = 0.8
+    value[4, 1], error[4, 1] = 40.0, 39.0
+    assert reach_of(value, error) == 0.8
+    error[4, 1] = 0.5
+    assert reach_of(value, error) == 40.0
+
+
+def test_uncertain_cells_are_hatched_and_unknown_ones_left_out():
+    result = hand_made().isel(wavelength=0, theta_i=0)
+    result.brdf_total_stderr[3, 5, 0, 0] = 9.0
+    result.brdf_total[2, 2] = np.nan
+    figure = hemisphere(result, ("M00",))
+    colours, hatched = figure.axes[0].collections[:2]
+    assert np.ma.getmaskarray(colours.get_array())[2, 2]
+    assert colours.get_array().mask.sum() == 1
+    assert hatched.get_hatch()
+    assert len(hatched.get_paths()) == 1
+
+
+def test_printed_letters_keep_their_size(tmp_path):
+    result = hand_made().isel(wavelength=0, theta_i=0)
+    for width in (85.0, 170.0):
+        figure = hemisphere(result, ("M00", "M10", "DOLP"), width_mm=width, errors=True)
+        assert_allclose(figure.get_size_inches()[0] * 25.4, width)
+        sizes = [t.get_fontsize() for t in figure.findobj(lambda a: hasattr(a, "get_text"))
+                 if t.get_text()]  # fmt: skip
+        assert min(sizes) >= 7.0
+    figure.savefig(tmp_path / "vector.svg")
+    assert "★ source" in (tmp_path / "vector.svg").read_text(encoding="utf-8")
+    with pytest.raises(ValueError, match="width_mm must lie in"):
+        hemisphere(result, width_mm=5.0)
+
+
+def test_wet_minus_dry_is_what_it_says():
+    two = hand_made().isel(wavelength=0, theta_i=0, drop=True)
+    states = xr.concat(
+        [two, 1.5 * two], xr.DataArray(["dry", "90 deg"], dims="state", name="state"),
+        data_vars="all",
+    ).assign_coords(theta_i=0.3)  # fmt: skip
+    figure = hemisphere(states, ("M00",), minus="dry")
+    titles = [axis.get_title() for axis in figure.axes if axis.name == "polar"]
+    assert titles == [
+        "M00, dry [1/sr]", "M00, 90 deg [1/sr]", "M00, 90 deg minus dry [1/sr]"
+    ]  # fmt: skip
+    last = [axis for axis in figure.axes if axis.name == "polar"][-1].collections[0]
+    assert_allclose(last.get_array(), 0.5 * two.brdf_total[..., 0, 0])
+    with pytest.raises(ValueError, match="minus must be one of dry, 90 deg"):
+        hemisphere(states, ("M00",), minus="wet")
+
+
+def test_cuts_break_where_nothing_is_known():
+    result = hand_made()
+    result.brdf_total[0, 0, 3, 4] = np.nan
+    figure = plane_cuts(result, ("M00",), wavelength=0.45)
+    curve = figure.axes[0].lines[0]
+    assert np.isnan(curve.get_ydata()).sum() == 1
+    assert "wavelength 0.45 um" in words_of(figure)
+
+
+def scan(angles=(0.3, 1.2), wavelengths=(0.5, 0.8)) -> xr.Dataset:
+    view = np.deg2rad([-40.0, -20.0, 20.0, 40.0])
+    a, w, v = (x.ravel() for x in np.meshgrid(angles, wavelengths, view, indexing="ij"))
+    return xr.Dataset(
+        {
+            "M00": ("geometry", 2.0 + v + a), "M00_stderr": ("geometry", 0.1 + 0 * v),
+            "M10": ("geometry", 0.5 + v),
+        },
+        {
+            "theta_i": ("geometry", a), "wavelength": ("geometry", w),
+            "theta_view": ("geometry", v), "theta_s": ("geometry", abs(v)),
+        },
+    )  # fmt: skip
+
+
+def test_residuals_are_points_in_standard_errors():
+    view = np.deg2rad(np.arange(-30.0, 81.0))
+    curve = xr.Dataset(
+        {"monte_carlo_M00": ("theta_view", 2.0 + 0 * view),
+         "monte_carlo_M00_stderr": ("theta_view", 0.075 + 0 * view)},
+        {"theta_view": view},
+    )  # fmt: skip
+    here = scan().isel(geometry=slice(0, 4))
+    found, unit = residuals("M00", here, curve, "monte_carlo")
+    assert unit == "standard errors"
+    # Where the curve does not reach there is no residual
+    assert np.isnan(found[0])
+    expected = (np.deg2rad([-20.0, 20.0, 40.0]) + 0.3) / np.hypot(0.1, 0.075)
+    assert_allclose(found[1:], expected)
+
+
+def test_each_incidence_and_wavelength_has_its_panel():
+    curves = xr.Dataset(
+        {f"analytic_{n}": (("theta_i", "theta_view"), np.ones((2, 3)))
+         for n in ("M00", "M10", "m10")},
+        {"theta_i": [0.3, 1.2], "theta_view": [-1.5, 0.0, 1.5]},
+    )  # fmt: skip
+    figure = scan_figure(scan(), curves)
+    titles = {axis.get_title() for axis in figure.axes} - {""}
+    assert len(titles) == 3 * 4
+    assert "M00 [1/sr], incidence 68.75°, 0.8 µm" in titles
+    lower = [axis for axis in figure.axes if "standard" in axis.get_ylabel()]
+    assert len(lower) == 4
+    assert all(line.get_linestyle() == "None" for line in lower[0].lines[1:])
+
+
+def test_the_command_draws_only_what_was_computed(tmp_path, capsys):
+    write_result(hand_made(), tmp_path / "r.nc")
+    source, target = str(tmp_path / "r.nc"), tmp_path / "r.pdf"
+    for wrong, words in (
+        (["--theta-i-deg", "90", "--wavelength-um", "0.45"], "got 90 deg"),
+        (["--wavelength-um", "5"], "one of 0.45 um, 0.85 um"),
+        ([], "--at must be given once for each further dimension"),
+        (["--at", "wavelength=0.5"], "got 0.5 um"),
+        (["--at", "wavelength=0.45", "--elements", "M99"], "--elements must be one of"),
+    ):
+        assert main(["plot", source, *wrong, "-o", str(target)]) == 2
+        assert words in capsys.readouterr().err
+        assert not target.exists()
+    good = ["--at", "wavelength=0.85", "--elements", "M10,M33", "--width-mm", "85"]
+    assert main(["plot", source, *good, "--scale", "symlog", "-o", str(target)]) == 0
+    assert target.read_bytes().startswith(b"%PDF")
+
+
+def test_histograms_agree_with_the_table():
+    from fitting import surface_statistics
+    from pbrdf import GaussianSurface
+
+    surface = GaussianSurface(
+        shape=(96, 96), spacing=1.0, corr_length=(12.0, 6.0), height_rms=1.0
+    )
+    found = surface_statistics(surface.sample(3))
+    shown = found.histograms()
+    assert [one.quantity for one in shown] == ["height", "slope along x", "slope along y"]
+    table = found.to_frame().value
+    for one, row in zip(shown, ("height_rms", "slope_rms_x", "slope_rms_y"), strict=True):
+        assert one.rms == table[row]
+    assert shown[2].rms > 1.5 * shown[1].rms
