@@ -71,13 +71,20 @@ def element(result: xr.Dataset, name: str, source: npt.ArrayLike = _LIGHT) -> El
         pick = {"stokes_out": out, "stokes_in": into}
         error = None if stderr is None else _told(stderr.sel(pick, drop=True), about, True)
         return Element(_told(value.sel(pick, drop=True), about), error)
+    return _polarisation(result, name, source)
+
+
+def _polarisation(result: xr.Dataset, name: str, source: npt.ArrayLike) -> Element:
+    """DOLP or AOLP of the light that a source scatters."""
     stokes = light(result, source)
     _require(stokes, name, "U")
     errors = stderr_of_light(result, source)
-    i, q, u = (stokes.sel(stokes_out=s, drop=True) for s in "IQU")
-    lit = i.where(i > 0.0)
+    parts: list[Any] = [stokes.sel(stokes_out=s, drop=True) for s in "IQU"]
+    i, q, u = parts
+    lit: Any = i.where(i > 0.0)
     polarised: Any = np.hypot(q, u)
     value: Any
+    error: Any
     if name == "DOLP":
         about = {"units": "1", "long_name": "degree of linear polarisation"}
         value = polarised / lit
@@ -95,10 +102,9 @@ def element(result: xr.Dataset, name: str, source: npt.ArrayLike = _LIGHT) -> El
         # Along the polarisation; without any, along the worse of both axes
         along: Any = np.hypot(q * dq, u * du) / known
         along = along.fillna(np.maximum(dq, du))
-        error: Any = np.hypot(along, value * di) / lit
+        error = np.hypot(along, value * di) / lit
     else:
-        error = 0.5 * np.hypot(u * dq, q * du) / known**2
-        error = error.where(value.notnull())
+        error = (0.5 * np.hypot(u * dq, q * du) / known**2).where(value.notnull())
     return Element(_told(value, about), _told(error, about, True))
 
 
