@@ -6,7 +6,7 @@ drawn. Each function returns a matplotlib Figure that belongs to no window syste
 """
 
 from pbrdf.plots.cuts import plane_cuts
-from pbrdf.plots.histograms import histograms
+from pbrdf.plots.densities import histograms
 from pbrdf.plots.polar import hemisphere
 from pbrdf.plots.scans import scan_figure
 from pbrdf.plots.sheet import COLOURS, WIDTHS, new_figure
