@@ -1,15 +1,20 @@
 """Contour and baseline of a drop in a silhouette, to a fraction of a pixel."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
+
+from fitting.drops.needle import Needle, erase_needle
+from fitting.drops.scene import Scene, scale_by_light, thresholds_of
 
 # A baseline leans less than this against the rows. [rad]
 MAX_LEAN = np.deg2rad(20)
 # Pixels of finite size, and grey levels known to a hundredth of the contrast, each for drop
 # and substrate, leave a baseline no better known. [pixels], [blurs]
 OFFSET_FLOOR, LEVEL_ERROR = 0.03, 0.035
+# Tones that differ less than this between dark (0) and ground (1) count as one
+LEAST_TONE = 0.03
 # Narrower than this, against the widest drop, is dust
 LEAST_WIDTH = 0.2
 
@@ -44,71 +49,120 @@ class DropContour:
 
 
 def find_drops(grey: np.ndarray, baseline: np.ndarray | None) -> list[DropContour]:
-    """Return the dark drops that stand on a straight dark line, from left to right."""
-    from skimage.filters import threshold_otsu
-    from skimage.measure import find_contours
+    """Return the dark drops that stand on a straight darker line, from left to right.
 
+    Each border is taken midway between its own two tones, those of the ground and of the
+    drop, or of the ground and of the substrate. A needle that enters from the top is left
+    out.
+    """
+    given = None if baseline is None else np.stack([baseline[:, 1], -baseline[:, 0]], 1)
     step = max(1, min(grey.shape) // 800)
-    few = grey[::step, ::step]
+    few = ndimage.gaussian_filter(grey[::step, ::step], 1.0)
     if np.ptp(few) < 0.02:
         return []
-    bright = ndimage.gaussian_filter(few, 1.0) > threshold_otsu(few)
-    if bright.all() or not bright.any():
-        return []
-    low, high = np.median(few[~bright]), np.median(few[bright])
-    if high - low < 0.02:
-        return []
-    light = _light(few, bright, high)
-    # A lamp may light only a part of a large picture
-    rows, columns = (np.flatnonzero(bright.any(axis=axis)) * step for axis in (1, 0))
-    top, left = max(rows[0] - 20 - step, 0), max(columns[0] - 20 - step, 0)
-    part = grey[top : rows[-1] + 20 + step, left : columns[-1] + 20 + step]
-    v, u = (
-        2 * (np.arange(n) + start) / size - 1
-        for n, start, size in zip(part.shape, (top, left), grey.shape, strict=True)
-    )
-    # A blurred contour at one level for all would move where the light is weaker
-    lit = np.clip(_plane(light, v, u), 0.5 * high, 2 * high)
-    part = (ndimage.gaussian_filter(part, 1.0) - low) / (lit - low)
-    contrast, level = 1.0, 0.5
-    down, right = np.gradient(part)
-    drops = []
-    for contour in find_contours(part, level):
-        if len(contour) < 60:
+    thresholds = thresholds_of(few)
+    grey, needle = erase_needle(grey, thresholds[0])
+    bare: list[DropContour] = []
+    for threshold in thresholds:
+        scene = scale_by_light(grey, step, threshold)
+        if scene is None:
             continue
-        # Towards the bright side, in the frame x to the right and y up
-        normal = np.stack(
-            [
-                ndimage.map_coordinates(right, contour.T, order=1),
-                -ndimage.map_coordinates(down, contour.T, order=1),
-            ],
-            axis=1,
-        )
-        xy = np.stack([contour[:, 1] + left, -(contour[:, 0] + top)], axis=1)
-        given = None if baseline is None else np.stack([baseline[:, 1], -baseline[:, 0]], 1)
-        drops += _drops_on_line(xy, normal, contrast, given)
+        drops = _drops_at(scene, scene.level, given)
+        tones = [_substrate_tone(scene, drop) for drop in drops]
+        tone = float(np.median(tones)) if tones else 1.0
+        if not tone < scene.level:
+            # The contour is the drop's and its image's, and no border of the substrate
+            bare = bare or [_at_own_level(scene, drop, scene.level) for drop in drops]
+            continue
+        if abs(tone) > LEAST_TONE:
+            drops = _drops_at(scene, (1 + tone) / 2, given) or drops
+        drops = [_at_own_level(scene, drop, (1 + tone) / 2) for drop in drops]
+        return [_outside(drop, needle) for drop in drops]
+    # A given baseline needs no border
+    return [_outside(drop, needle) for drop in bare] if given is not None else []
+
+
+def _drops_at(scene: Scene, level: float, given: np.ndarray | None) -> list[DropContour]:
+    """Return the drops whose border and baseline are contours at one level."""
+    drops = []
+    for xy in scene.contours(level):
+        drops += _drops_on_line(xy, scene.normals(xy), 1.0, given)
     # Dust on the substrate is no second drop
     widest = max((np.ptp(drop.points[:, 0]) for drop in drops), default=0.0)
     drops = [drop for drop in drops if np.ptp(drop.points[:, 0]) > LEAST_WIDTH * widest]
     return sorted(drops, key=lambda drop: drop.baseline[:, 1].mean())
 
 
-def _light(grey: np.ndarray, bright: np.ndarray, high: float) -> np.ndarray:
-    """Fit a plane to the bright ground, away from its borders; its level, if that fails."""
-    ground = ndimage.binary_erosion(bright, iterations=6)
-    v, u = np.nonzero(ground)
-    if v.size < 100:
-        return np.array([high, 0.0, 0.0])
-    rows, columns = grey.shape
-    terms = np.stack(
-        [np.ones(v.size), 2 * (u + 0.5) / columns - 1, 2 * (v + 0.5) / rows - 1], axis=1
+def _frame(drop: DropContour) -> tuple[np.ndarray, np.ndarray]:
+    """Return origin and axes along and above the baseline, x to the right and y up."""
+    cos, sin = np.cos(drop.lean), np.sin(drop.lean)
+    axes = np.array([[cos, sin], [-sin, cos]])
+    row, column = drop.baseline[0]
+    return np.array([column, -row]) - drop.points[0, 0] * axes[0], axes
+
+
+def _substrate_tone(scene: Scene, drop: DropContour) -> float:
+    """Median of the substrate beside the drop, just below the baseline; 0 out of sight."""
+    origin, axes = _frame(drop)
+    left, right = drop.points[:, 0].min(), drop.points[:, 0].max()
+    reach = np.arange(6 * drop.blur + 3, 0.75 * (right - left) + 30)
+    below = np.arange(3 * drop.blur + 2, 6 * drop.blur + 8)
+    along = np.concatenate([left - reach, right + reach])
+    grid = np.stack(np.meshgrid(along, -below), axis=-1).reshape(-1, 2)
+    tones = scene.at(scene.part, origin + grid @ axes)
+    return float(np.nanmedian(tones)) if np.isfinite(tones).any() else 0.0
+
+
+def _at_own_level(scene: Scene, drop: DropContour, level: float) -> DropContour:
+    """Move the border from the substrate's level to that midway from ground to drop."""
+    origin, axes = _frame(drop)
+    xy = origin + drop.points @ axes
+    normal = scene.normals(xy)
+    normal /= np.maximum(np.hypot(*normal.T), 1e-9)[:, None]
+    depth = 3 * max(drop.blur, 1.0) + 2
+    tones = scene.at(scene.part, xy - depth * normal)[drop.points[:, 1] > depth]
+    tone = float(np.nanmedian(tones)) if np.isfinite(tones).any() else float("nan")
+    if not np.isfinite(tone) or abs((1 + tone) / 2 - level) < LEAST_TONE / 2:
+        return drop
+    best = np.empty((0, 2))
+    for contour in scene.contours((1 + tone) / 2):
+        points = (contour - origin) @ axes.T
+        inside = (points[:, 1] > 0.5) & (
+            np.abs(points[:, 0] - drop.points[:, 0].mean())
+            < np.ptp(drop.points[:, 0]) / 2 + 10
+        )
+        if inside.all():
+            continue
+        order = np.roll(np.arange(len(points)), -int(np.argmin(inside)))
+        for box in ndimage.find_objects(ndimage.label(inside[order])[0]):
+            run = points[order[box[0]]]
+            if len(run) > len(best):
+                best = run
+    # What lies elsewhere is no border of this drop
+    if len(best) < 20 or abs(best[:, 1].max() - drop.points[:, 1].max()) > 3 * depth:
+        return drop
+    if best[0, 0] > best[-1, 0]:
+        best = best[::-1]
+    steepness = np.hypot(*scene.normals(origin + best @ axes).T)
+    contacts = origin + np.outer([best[0, 0], best[-1, 0]], axes[0])
+    blur = float((1 - tone) / np.sqrt(2 * np.pi) / np.median(steepness))
+    return replace(
+        drop,
+        points=best,
+        baseline=np.stack([-contacts[:, 1], contacts[:, 0]], axis=1),
+        blur=blur,
     )
-    return np.linalg.lstsq(terms, grey[v, u], rcond=None)[0]
 
 
-def _plane(light: np.ndarray, v: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Evaluate the plane at rows v and columns u, from -1 to 1 in the picture."""
-    return light[0] + light[1] * u[None, :] + light[2] * v[:, None]
+def _outside(drop: DropContour, needle: Needle | None) -> DropContour:
+    """Leave out the points that a needle touches."""
+    if needle is None:
+        return drop
+    origin, axes = _frame(drop)
+    column = (origin + drop.points @ axes)[:, 0]
+    upper = drop.points[:, 1] > 0.5 * drop.points[:, 1].max()
+    touched = upper & (column > needle.left) & (column < needle.right)
+    return replace(drop, points=drop.points[~touched])
 
 
 def _drops_on_line(
@@ -130,7 +184,12 @@ def _drops_on_line(
         along = (xy - origin) @ direction
         above = (xy - origin) @ np.array([-direction[1], direction[0]])
         flank = upward & (np.abs(above) < 2.5) if given is None else np.abs(above) < 2.5
-        runs = _bulges(along, above, flank, normal[:, 1] > 0)
+        # Nothing but the contacts need lie on a given baseline
+        least = 20 if given is None else 4
+        if np.count_nonzero(flank) < least:
+            runs = []
+        else:
+            runs = _bulges(along, above, flank, normal[:, 1] > 0)
         found = [_measure(xy, flank, run, steepness, contrast, given) for run in runs]
         if runs or given is not None:
             return [drop for drop in found if drop is not None]
@@ -175,8 +234,6 @@ def _bulges(
     along: np.ndarray, above: np.ndarray, flank: np.ndarray, bright_above: np.ndarray
 ) -> list[np.ndarray]:
     """Return the indices of each high run between two flanks with brightness over it."""
-    if np.count_nonzero(flank) < 20:
-        return []
     start = int(np.argmax(flank))
     order = np.roll(np.arange(along.size), -start)
     closed = np.hypot(along[0] - along[-1], above[0] - above[-1]) < 1.5

@@ -46,6 +46,9 @@ class ContactAngle:
         Standard deviation of the contour's blur. [pixels]
     contour : ndarray, shape (n, 2)
         Row and column of the drop's contour from left to right. [pixels]
+    per_pixel : tuple of float
+        Change of the left and of the right angle for a baseline one pixel lower, as where a
+        substrate's front edge hides the foot; a silhouette does not show it. [degrees]
     warnings : tuple of str
         What may matter to the angles.
     """
@@ -61,6 +64,7 @@ class ContactAngle:
     rms: tuple[float, float]
     blur: float
     contour: np.ndarray
+    per_pixel: tuple[float, float]
     warnings: tuple[str, ...] = field(default=())
 
     @property
@@ -81,6 +85,7 @@ class ContactAngle:
             "model": list(self.model),
             "rms_pixels": list(self.rms),
             "blur_pixels": self.blur,
+            "deg_per_pixel_lower": list(self.per_pixel),
             "warnings": list(self.warnings),
         }
 
@@ -155,6 +160,8 @@ def contact_angle(
     if not drops:
         raise DataFileError(name, *why_no_drop(part, given))
     drop, remark = _chosen(drops, which)
+    if given is not None:
+        remark += _off_the_silhouette(drop, part)
     return _fit_sides(drop, origin, name, remarks + remark)
 
 
@@ -176,6 +183,20 @@ def _chosen(drops: list[DropContour], which: int | None) -> tuple[DropContour, l
         f"the picture shows {len(drops)} drops; measured is number {widest + 1} from the "
         "left, the widest (which= chooses another)"
     ]
+
+
+def _off_the_silhouette(drop: DropContour, part: np.ndarray) -> list[str]:
+    """Say where the picture shows another baseline than the one that was given."""
+    middle, column = drop.baseline.mean(axis=0)
+    for own in find_drops(part, None) or find_drops(part.max() - part, None):
+        row, at = own.baseline.mean(axis=0)
+        if abs(at - column) < np.ptp(drop.points[:, 0]) / 4 and abs(row - middle) > 2:
+            where = "above" if row < middle else "below"
+            return [
+                f"the border of the substrate lies {abs(row - middle):.1f} pixels {where} "
+                "the given baseline"
+            ]
+    return []
 
 
 def _grey_array(image: npt.ArrayLike) -> np.ndarray:
@@ -278,6 +299,10 @@ def _fit_sides(
         rms=(results[0][0].rms, results[1][0].rms),
         blur=drop.blur,
         contour=contour,
+        per_pixel=(
+            -float(np.rad2deg(results[0][0].slope_by_height)),
+            -float(np.rad2deg(results[1][0].slope_by_height)),
+        ),
         warnings=tuple(remarks),
     )
 

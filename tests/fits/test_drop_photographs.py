@@ -17,9 +17,20 @@ def grey(name: str) -> np.ndarray:
     return image if image.ndim == 2 else image[..., 0]
 
 
-@pytest.mark.parametrize("name", ["drop_plain20.png", "drop_inverted_70.png"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "drop_plain20.png",
+        "drop_inverted_70.png",
+        "drop_needle_in_110.png",
+        "drop_mirror_90.png",
+        "drop_mirrorbase_45.png",
+        "drop_mirrorsharp_120.png",
+        "drop_reflect_120.png",
+    ],
+)
 def test_angle_lies_in_its_interval(name):
-    degrees = float(name[-6:-4])
+    degrees = float(name[:-4].rpartition("_")[2].removeprefix("plain"))
     result = contact_angle(CASES / name)
     for side in (result.left, result.right):
         assert abs(side.value - degrees) < 1
@@ -57,3 +68,26 @@ def test_of_several_drops_one_is_named():
     assert contact_angle(image, which=1).right.value == pytest.approx(20, abs=1.5)
     with pytest.raises(ValueError, match="which must be 1 to 2, got 3"):
         contact_angle(image, which=3)
+
+
+@pytest.mark.parametrize("name", ["drop_mirror_90.png", "drop_mirrorsharp_120.png"])
+def test_given_baseline_of_a_mirror_image(name):
+    """Also where the substrate has the ground's tone: then nothing else shows it."""
+    image = grey(name).copy()
+    degrees = float(name[:-4].rpartition("_")[2])
+    result = contact_angle(image, baseline=[[300, 60], [300, 520]])
+    assert result.left.value == pytest.approx(degrees, abs=0.5)
+    image[image > 120] = image[:250].max()
+    result = contact_angle(image, baseline=[[300, 60], [300, 520]])
+    for side in (result.left, result.right):
+        assert side.value == pytest.approx(degrees, abs=1)
+        assert side.low < degrees < side.high
+
+
+def test_a_baseline_off_the_substrate_is_named():
+    image = grey("drop_inverted_70.png")
+    result = contact_angle(image, baseline=[[294, 60], [294, 520]])
+    assert any("6.0 pixels below the given" in remark for remark in result.warnings)
+    # The angle moves by what was announced
+    shift = contact_angle(image).left.value - result.left.value
+    assert shift == pytest.approx(6 * result.per_pixel[0], rel=0.1)

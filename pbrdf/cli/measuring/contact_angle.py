@@ -105,5 +105,7 @@ def _lines(found: "ContactAngle") -> str:
             *rows,
             f"base  {found.base_width:.1f} pixels wide, drop {found.height:.1f} high; from "
             f"row {top:.1f}, column {left:.1f} to row {bottom:.1f}, column {right:.1f}",
+            "A foot hidden by the substrate's front edge is not seen in a silhouette: each "
+            f"pixel of it adds {max(found.per_pixel, key=abs):+.2f} degrees.",
         ]
     )
