@@ -30,7 +30,7 @@ def embree_alone(mesh):
     low, high = mesh.bounds
     period = np.asarray(mesh.period)
     moves = [
-        np.array([a, b, 0.0]) * [*period, 0.0] for a in range(-2, 3) for b in range(-2, 3)
+        np.array([a, b, 0.0]) * [*period, 0.0] for a in range(-1, 2) for b in range(-1, 2)
     ]
     count = len(mesh.vertices)
     points = np.concatenate([mesh.vertices + move for move in moves])
