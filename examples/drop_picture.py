@@ -79,13 +79,13 @@ def draw(picture: DropPicture, rng: np.random.Generator) -> np.ndarray:
     rows = int(height + 0.5 * picture.base_width + 80)
     column = columns / 2 + x * cos - z * sin + rng.uniform(-0.5, 0.5)
     row = rows - 0.25 * picture.base_width - x * sin - z * cos + rng.uniform(-0.5, 0.5)
-    level = gaussian_filter(_fill(row, column, rows, columns), picture.blur, mode="nearest")
+    level = gaussian_filter(fill(row, column, rows, columns), picture.blur, mode="nearest")
     level = (0.85 - 0.75 * level) * (1 - picture.uneven_light * np.linspace(0, 1, columns))
     level = level + 0.75 * picture.grain * rng.standard_normal(level.shape)
     return np.clip(np.rint(255 * level), 0, 255).astype(np.uint8)
 
 
-def _fill(row: np.ndarray, column: np.ndarray, rows: int, columns: int) -> np.ndarray:
+def fill(row: np.ndarray, column: np.ndarray, rows: int, columns: int) -> np.ndarray:
     """Fraction of each pixel inside a polygon, from eight exact chords a pixel."""
     fine = 8
     chord = (np.arange(rows * fine) + 0.5) / fine - 0.5

@@ -127,7 +127,7 @@ def _at_own_level(scene: Scene, drop: DropContour, level: float) -> DropContour:
     best = np.empty((0, 2))
     for contour in scene.contours((1 + tone) / 2):
         points = (contour - origin) @ axes.T
-        inside = (points[:, 1] > 0.5) & (
+        inside = (points[:, 1] > 2.5) & (
             np.abs(points[:, 0] - drop.points[:, 0].mean())
             < np.ptp(drop.points[:, 0]) / 2 + 10
         )

@@ -1,0 +1,94 @@
+"""Print how contact angles survive what disturbs photographs; see README.md."""
+
+import argparse
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from examples.drop_picture import fill, meridian
+from fitting import contact_angle
+
+KINDS = ("plain", "grey substrate", "mirror image", "needle", "bright drop", "no drop")
+ROWS, COLUMNS = 360, 560
+
+
+def photograph(kind: str, angle: float, rng: np.random.Generator) -> np.ndarray:
+    """Return a picture, 8 bits; all but its kind is drawn from the generator."""
+    bond = rng.uniform(0, 1.5)
+    half = meridian(angle, bond)
+    half = half * min(rng.uniform(60, 100) / half[:, 0].max(), 190 / half[-1, 1])
+    outline = np.concatenate([(half * [-1, 1])[::-1], half[1:]])
+    # x to the right and z up, from the middle of the base
+    drop = np.stack([outline[:, 0], half[-1, 1] - outline[:, 1]], axis=1)
+    lean = np.deg2rad(rng.uniform(-2, 2))
+    cos, sin = np.cos(lean), np.sin(lean)
+    row, column = 230 + rng.uniform(-8, 8), COLUMNS / 2 + rng.uniform(-20, 20)
+
+    def layer(points: np.ndarray) -> np.ndarray:
+        x, z = points.T
+        return fill(row - x * sin - z * cos, column + x * cos - z * sin, ROWS, COLUMNS)
+
+    ground = np.full((ROWS, COLUMNS), 0.85)
+    far = 2000.0
+    base = layer(np.array([[-far, 0], [far, 0], [far, -far], [-far, -far]]))
+    tone = {"grey substrate": rng.uniform(0.2, 0.5), "mirror image": rng.uniform(0.6, 0.7)}
+    level = ground + (tone.get(kind, 0.06) - ground) * base
+    if kind in tone:
+        image = layer(drop * [1, -1])
+        level = level + (rng.uniform(0.06, 0.8 * tone[kind]) - level) * image * base
+    if kind == "no drop":
+        # A block with a slanting side
+        w, h, slant = rng.uniform(40, 90), rng.uniform(40, 120), rng.uniform(0, 40)
+        drop = np.array([[-w, 0], [-w, h], [w - slant, h], [w, 0]])
+    level = level + (0.06 - level) * layer(drop)
+    if kind == "needle":
+        w, end = rng.uniform(6, 14), 0.8 * half[-1, 1]
+        needle = layer(np.array([[-w, end], [-w, far], [w, far], [w, end]]))
+        level = level + (0.06 - level) * needle
+    level = gaussian_filter(level, rng.uniform(0.8, 2.5), mode="nearest")
+    if kind == "bright drop":
+        level = 0.95 - level
+    level = level * (1 - rng.uniform(0, 0.15) * np.linspace(0, 1, COLUMNS))
+    level = level + rng.uniform(0.005, 0.03) * rng.standard_normal(level.shape)
+    return np.clip(np.rint(255 * level), 0, 255).astype(np.uint8)
+
+
+def main() -> None:
+    """Print a row for each kind of disturbance."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--pictures", type=int, default=400, help="of all kinds together")
+    parser.add_argument("--first-seed", type=int, default=0)
+    arguments = parser.parse_args()
+    print("kind            pictures refused |   bias    rms  stderr  worst  inside")
+    everywhere = []
+    for number, kind in enumerate(KINDS):
+        errors, stderrs, inside, refused = [], [], [], 0
+        count = -(-arguments.pictures // len(KINDS))
+        for seed in range(arguments.first_seed, arguments.first_seed + count):
+            rng = np.random.default_rng([seed, number])
+            degrees = rng.uniform(15, 165)
+            try:
+                found = contact_angle(photograph(kind, np.deg2rad(degrees), rng))
+            except ValueError as error:
+                refused += 1
+                if kind != "no drop":
+                    print(f"  seed {seed}, {degrees:.0f} degrees: {str(error)[:120]}")
+                continue
+            for side in (found.left, found.right):
+                errors.append(side.value - degrees)
+                stderrs.append(side.stderr)
+                inside.append(side.low <= degrees <= side.high)
+        everywhere += inside if kind != "no drop" else []
+        line = f"{kind:16}{count:8d} {refused:7d} | "
+        if errors and kind != "no drop":
+            worst = max(errors, key=abs)
+            line += (
+                f"{np.mean(errors):+6.2f} {np.sqrt(np.mean(np.square(errors))):6.2f} "
+                f"{np.mean(stderrs):7.2f} {worst:+6.2f} {np.mean(inside):7.1%}"
+            )
+        print(line, flush=True)
+    print(f"95 % intervals hold {np.mean(everywhere):.1%} of {len(everywhere)} sides")
+
+
+if __name__ == "__main__":
+    main()
