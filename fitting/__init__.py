@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from fitting.models.simulated import SimulatedModel
     from fitting.objective.parameters import PARAMETERS
     from fitting.pipeline import PipelineResult, run_pipeline
+    from fitting.prediction.prediction import Prediction
+    from fitting.prediction.run import predict
     from fitting.readings import masks
     from fitting.readings.aperture import Aperture
     from fitting.readings.noise import Noise
@@ -36,6 +38,7 @@ __all__ = [
     "Noise",
     "PhysicsError",
     "PipelineResult",
+    "Prediction",
     "SimulatedModel",
     "SlopeDistribution",
     "SurfaceStatistics",
@@ -45,6 +48,7 @@ __all__ = [
     "f_test",
     "fit",
     "masks",
+    "predict",
     "profile_likelihood",
     "run_pipeline",
     "slope_distribution",
@@ -57,6 +61,8 @@ _MODULES = {
     "drops.silhouette": ("ContactAngle", "contact_angle"),
     "estimate": ("Estimate",),
     "pipeline": ("PipelineResult", "run_pipeline"),
+    "prediction.prediction": ("Prediction",),
+    "prediction.run": ("predict",),
     "run": ("fit",),
     "checks.scan": ("check_scan",),
     "checks.finding": ("Finding", "PhysicsError"),

@@ -1,0 +1,122 @@
+"""What a map and optical constants predict: a Mueller BRDF and the interval of M00."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from fitting.prediction.facets import Facets
+from pbrdf import MicrofacetModel
+from pbrdf.analytic.bounces import second_bounce
+
+Array = np.ndarray
+
+# Points an axis of the second bounce: 2 % of a small term
+_NODES = 24
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Draw:
+    """One member of the predictive distribution.
+
+    Parameters
+    ----------
+    model : MicrofacetModel
+        Over its own slopes and index.
+    gain : ndarray, shape (k,)
+        Factors of the facet model's own error. [1]
+    base : ndarray, shape (k,)
+        Lambertian albedo of what the map does not show. [1]
+    """
+
+    model: MicrofacetModel
+    gain: Array
+    base: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prediction:
+    """Reflectance predicted from a map, nothing fitted.
+
+    Parameters
+    ----------
+    model : MicrofacetModel
+        Facets at the most likely value of everything.
+    wavelength : float
+        In vacuum. [um]
+    facets : Facets
+        Slopes of the map as light sees them.
+    draws : tuple of Draw
+        The predictive distribution.
+    notes : tuple of str
+        What was assumed, in words.
+    """
+
+    model: MicrofacetModel
+    wavelength: float
+    facets: Facets
+    draws: tuple[Draw, ...]
+    notes: tuple[str, ...]
+
+    def brdf(
+        self, theta_i: npt.ArrayLike, theta_s: npt.ArrayLike, dphi: npt.ArrayLike,
+        *, phi_i: npt.ArrayLike = 0.0,
+    ) -> Array:  # fmt: skip
+        """Mueller BRDF of one and two bounces; arguments broadcast.
+
+        Parameters
+        ----------
+        theta_i, theta_s, dphi : array_like
+            As in `MicrofacetModel.brdf`. [rad]
+        phi_i : array_like
+            Azimuth of the source from the x axis of the map. [rad]
+
+        Returns
+        -------
+        ndarray, shape (..., 4, 4)
+            [1/sr]
+        """
+        angles = (theta_i, theta_s, dphi)
+        once = self.model.brdf(*angles, self.wavelength, phi_i=phi_i)
+        return once + self._twice(angles, phi_i)
+
+    def interval(
+        self, theta_i: npt.ArrayLike, theta_s: npt.ArrayLike, dphi: npt.ArrayLike,
+        *, phi_i: npt.ArrayLike = 0.0, level: float = 0.95,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Interval that holds a reading of M00 with a chance of `level`. [1/sr]"""
+        if not 0 < level < 1:
+            msg = f"level must lie between 0 and 1, got {level:g}. 0.95 is usual."
+            raise ValueError(msg)
+        angles = (theta_i, theta_s, dphi)
+        twice = self._twice(angles, phi_i)[..., 0, 0]
+        values = []
+        for draw in self.draws:
+            once = draw.model.brdf(*angles, self.wavelength, phi_i=phi_i)[..., 0, 0]
+            whole = (once + twice)[..., None] * draw.gain + draw.base / np.pi
+            values.append(whole)
+        ends = [(1 - level) / 2, (1 + level) / 2]
+        low, high = np.quantile(np.concatenate(values, axis=-1), ends, axis=-1)
+        return low, high
+
+    def _twice(self, angles: tuple[npt.ArrayLike, ...], phi_i: npt.ArrayLike) -> Array:
+        theta_i, theta_s, dphi = angles
+        return second_bounce(
+            self._gaussian, theta_i, theta_s, dphi, self.wavelength,
+            phi_i=phi_i, nodes=_NODES,
+        )  # fmt: skip
+
+    @cached_property
+    def _gaussian(self) -> MicrofacetModel:
+        """Gaussian slopes of the same median, for the second bounce only."""
+        table = self.model.slope_distribution
+        x, y = table.slope_rms  # type: ignore[union-attr]
+        radius = np.hypot(table.slope_x[:, None] / x, table.slope_y / y).ravel()  # type: ignore[union-attr]
+        order = np.argsort(radius)
+        share = np.cumsum(table.density.ravel()[order])  # type: ignore[union-attr]
+        median = radius[order][np.searchsorted(share, share[-1] / 2)]
+        # A Gaussian of unit slopes has its median at 1.18; cliffs pair with nothing nearby
+        scale = float(median / np.sqrt(2 * np.log(2)))
+        slope = scale * x if np.isclose(x, y, rtol=1e-3) else (scale * x, scale * y)
+        return MicrofacetModel(self.model.material, slope_rms=slope)

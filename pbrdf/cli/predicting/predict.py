@@ -1,0 +1,214 @@
+"""`pbrdf predict`: reflectance from a height map and an index, nothing fitted."""
+
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pbrdf.cli import declaring, options
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from fitting.prediction.prediction import Prediction
+
+# Of the sources of most goniometers; only where neither scan nor user says
+_ASSUMED = 0.65
+# Beyond this zenith goniometers see their own sample holder [deg]
+_FURTHEST = 80.0
+
+
+def command(
+    surface: Annotated[
+        Path, typer.Argument(help="Height map of the coating.", show_default=False)
+    ],
+    n: options.OptionalIndex = None,
+    kappa: options.Kappa = 0.0,
+    material_file: options.MaterialFile = None,
+    scan: Annotated[
+        Path | None,
+        typer.Option(help="Goniometer file to compare with afterwards."),
+    ] = None,
+    wavelength: Annotated[
+        float | None,
+        typer.Option(
+            "--wavelength-um", min=0.01, max=1e3, help="Wavelength; that of the scan."
+        ),
+    ] = None,
+    theta_i: options.Incidences = "10,30,50,70",
+    resolution: Annotated[
+        float,
+        typer.Option(
+            "--resolution-um",
+            min=0.0,
+            max=1e3,
+            help="Standard deviation of the instrument's point spread, about 0.21 of its "
+            "wavelength over its numerical aperture.",
+        ),
+    ] = 0.0,
+    diffuse_albedo: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="Of the base under the interface.")
+    ] = 0.0,
+    spacing: options.Spacing = None,
+    unit: options.Unit = None,
+    channel: options.Channel = None,
+    columns: options.ColumnsOption = None,
+    block: options.Block = None,
+    um_per_level: options.UmPerLevel = None,
+    mend: options.MendOption = "all",
+    azimuth_of_forward: declaring.Forward = None,
+    output: options.Output = None,
+    force: options.Force = False,
+    seed: options.Seed = 0,
+) -> None:
+    """Predict the Mueller BRDF of a coating from its height map and its index.
+
+    Nothing is fitted. A scan is compared only afterwards: absolute, and with gain and
+    Lambertian base freed. With --output writes the prediction at the directions of the
+    scan, or in the plane, as a goniometer file (.csv).
+
+    Example: pbrdf predict map.npy --spacing-um 0.2268 --n 1.5 --scan scan.csv
+    """
+    from dataclasses import replace
+
+    from fitting import predict
+    from pbrdf import HeightMap
+    from pbrdf.cli.reading import read_material, read_scan, read_surface
+    from pbrdf.cli.staging import staged_file
+
+    material = read_material(n, kappa, material_file)
+    if material is None:
+        msg = "--n must be given, got none. Or give a --material-file."
+        raise ValueError(msg)
+    if diffuse_albedo:
+        material = replace(material, diffuse_albedo=diffuse_albedo)
+    declared = declaring.declarations(None, azimuth_of_forward, None, None, None)
+    measured = None if scan is None else read_scan(scan, declared=declared)
+    if measured is not None and wavelength is not None and "wavelength" in measured.coords:
+        measured = read_scan(scan, wavelength=wavelength, declared=declared)  # type: ignore[arg-type]
+    wave = _wavelength(wavelength, measured)
+    heights = read_surface(
+        surface, kind=options.Kind.map, spacing=spacing, unit=unit, channel=channel,
+        columns=columns, block=block, um_per_level=um_per_level, mend=mend,
+    )  # fmt: skip
+    if not isinstance(heights, HeightMap):
+        msg = f"{surface.name} must be a height map, a profile has slopes along one axis."
+        raise ValueError(msg)
+    found = predict(heights, material, wavelength=wave, resolution=resolution, seed=seed)
+    geometry = _plane(options.incidences(theta_i)) if measured is None else measured
+    predicted = _readings(found, geometry)
+    if output is not None:
+        from data_io import write_goniometer
+
+        with staged_file(output, force=force) as stage:
+            write_goniometer(predicted.drop_vars(["low", "high"]), stage)
+    for note in found.notes:
+        typer.echo(note)
+    lines = _brightest(predicted) if measured is None else _compared(predicted, measured)
+    for line in lines:
+        typer.echo(line)
+    if output is not None:
+        typer.echo(f"Result: {output}")
+
+
+def _wavelength(given: float | None, scan: "xr.Dataset | None") -> float:
+    """Return the wavelength that was given, else the scan's only one, else a usual one."""
+    import numpy as np
+
+    if given is not None:
+        return given
+    if scan is not None and "wavelength" in scan.coords:
+        waves = np.unique(scan.wavelength.values)
+        if waves.size == 1 and np.isfinite(waves[0]):
+            return float(waves[0])
+        known = ", ".join(f"{wave:g}" for wave in waves)
+        msg = f"--wavelength-um must be one of {known} of the scan, got none."
+        raise ValueError(msg)
+    text = f"no wavelength is known: {_ASSUMED:g} um assumed (--wavelength-um)"
+    warnings.warn(text, UserWarning, stacklevel=2)
+    return _ASSUMED
+
+
+def _plane(incidences: list[float]) -> "xr.Dataset":
+    """Return view angles in the plane, every 5 degrees."""
+    import numpy as np
+    import xarray as xr
+
+    views = np.deg2rad(np.arange(-80.0, 81.0, 5.0))
+    source, view = (m.ravel() for m in np.meshgrid(incidences, views, indexing="ij"))
+    angles = {
+        "theta_i": source, "theta_s": np.abs(view), "dphi": np.where(view < 0, 0.0, np.pi)
+    }  # fmt: skip
+    return xr.Dataset(coords={k: ("geometry", v) for k, v in angles.items()})
+
+
+def _readings(found: "Prediction", geometry: "xr.Dataset") -> "xr.Dataset":
+    """Return the prediction at the directions of a scan, with its interval."""
+    import numpy as np
+    import xarray as xr
+
+    names = ("theta_i", "theta_s", "dphi")
+    angles = [geometry[name].values for name in names]
+    matrices = found.brdf(*angles)
+    low, high = found.interval(*angles)
+    data: dict[str, Any] = {
+        f"M{i}{j}": ("geometry", matrices[:, i, j]) for i in range(4) for j in range(4)
+    }
+    # The half of an interval of 95 % is 1.96 standard errors
+    data["M00_stderr"] = ("geometry", (high - low) / 3.92)
+    data |= {"low": ("geometry", low), "high": ("geometry", high)}
+    coords: dict[str, Any] = {
+        name: ("geometry", a) for name, a in zip(names, angles, strict=True)
+    }
+    coords["wavelength"] = ("geometry", np.full(low.size, found.wavelength))
+    return xr.Dataset(data, coords=coords)
+
+
+def _brightest(predicted: "xr.Dataset") -> Iterator[str]:
+    """Yield the specular readings with their intervals."""
+    import numpy as np
+
+    for theta in np.unique(predicted.theta_i.values):
+        here = predicted.isel(geometry=np.flatnonzero(predicted.theta_i.values == theta))
+        at = int(here.M00.argmax())
+        one = here.isel(geometry=at)
+        yield (
+            f"incidence {np.rad2deg(theta):.3g} deg: M00 greatest at view "
+            f"{np.rad2deg(float(one.theta_s)):.3g} deg, {float(one.M00):.3g} 1/sr "
+            f"(95 %: {float(one.low):.3g} .. {float(one.high):.3g})"
+        )
+
+
+def _compared(predicted: "xr.Dataset", scan: "xr.Dataset") -> Iterator[str]:
+    """Yield the misfit by angle and over all."""
+    import numpy as np
+
+    from fitting.prediction.comparison import misfit
+
+    if "M00" not in scan:
+        msg = (
+            f"scan must hold M00 to be compared, got {', '.join(map(str, scan.data_vars))}."
+        )
+        raise ValueError(msg)
+    if scan.attrs.get("quantity") == "relative":
+        yield "The scan is relative: look at the misfit with free gain only."
+    measured = scan.M00.values
+    low_enough = predicted.theta_s.values <= np.deg2rad(_FURTHEST + 0.01)
+    counted = np.isfinite(measured) & (measured > 0) & low_enough
+    yield f"M00 against the scan, {int(counted.sum())} readings to {_FURTHEST:g} deg:"
+    thetas = np.round(predicted.theta_i.values, 6)
+    for theta in [*np.unique(thetas[counted]), None]:
+        here = counted if theta is None else counted & (thetas == theta)
+        if here.sum() < 3:
+            continue
+        name = "all" if theta is None else f"incidence {np.rad2deg(theta):.3g} deg"
+        off = misfit(predicted.M00.values[here], measured[here])
+        inside = (predicted.low.values <= measured) & (measured <= predicted.high.values)
+        yield (
+            f"  {name}: off by {off.absolute:.0%} rms as predicted; {off.base_free:.0%} "
+            f"with a Lambertian base of {off.base:.3g}; {off.gain_free:.0%} with gain "
+            f"{off.gain:.3g} and base {off.gain_base:.3g}; the 95 % interval holds "
+            f"{inside[here].mean():.0%}"
+        )

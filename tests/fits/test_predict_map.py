@@ -1,0 +1,150 @@
+"""Prediction from a map: clean maps follow the Monte Carlo, terraces follow their truth."""
+
+import numpy as np
+import pytest
+
+import fitting
+from fitting.prediction.comparison import misfit
+from fitting.prediction.facets import diffraction, facets_of, find_patch, slope_table
+from fitting.prediction.scan_density import free_density
+from pbrdf import (
+    GaussianSurface,
+    HeightMap,
+    Material,
+    MicrofacetModel,
+    Scene,
+    simulate,
+)
+
+GLASS = Material(1.5)
+
+
+def ground(slope: float, *, n: int = 256, spacing: float = 1.0) -> HeightMap:
+    surface = GaussianSurface(
+        shape=(n, n), spacing=spacing, corr_length=10.0, slope_rms=slope
+    )
+    return surface.sample(seed=3)
+
+
+@pytest.mark.parametrize("slope", [0.1, 0.3])
+def test_clean_map_has_the_monte_carlo_over_it(slope: float) -> None:
+    surface = ground(slope)
+    theta_i = np.deg2rad([10.0, 30.0, 50.0])
+    run = simulate(
+        Scene(surface, GLASS), theta_i, phi_i="uniform", n_rays=60_000, n_theta=30,
+        n_dphi=36, stokes="unpolarized", seed=4,
+    )  # fmt: skip
+    traced = run.brdf_total.values[..., 0, 0]
+    noise = np.sqrt((run.brdf_stderr.values[..., 0, 0] ** 2).sum(0))
+    theta_s, dphi = run.theta_s.values[:, None], run.dphi.values
+    found = fitting.predict(surface, GLASS, wavelength=0.65)
+    half = np.deg2rad([-1.0, 0.0, 1.0])
+    # Mean over a bin by Simpson's rule, as the tracer counts
+    weight = np.array([1, 4, 1]) / 6
+    views = [np.clip(theta_s + 1.5 * h, 0, np.pi / 2) for h in half]
+    incidence = theta_i[:, None, None]
+    mean = sum(
+        w * found.brdf(incidence, view, dphi)[..., 0, 0]
+        for w, view in zip(weight, views, strict=True)
+    )
+    seen = (traced > 0.1 * traced.max(axis=(1, 2), keepdims=True)) & (noise < 0.1 * traced)
+    off = (mean / np.where(seen, traced, 1) - 1)[seen]
+    spread = np.sqrt(np.mean(off**2) - np.mean((noise[seen] / traced[seen]) ** 2))
+    assert abs(off.mean()) < 0.05
+    assert spread < 0.08
+
+
+def test_blur_vanishes_with_the_wavelength() -> None:
+    surface = ground(0.2)
+    blurs = [
+        facets_of(surface, w, patch=find_patch(surface, w)).blur for w in (0.2, 0.8, 3.2)
+    ]
+    assert blurs[0] < 0.025
+    # Within a small patch slopes grow as its size: the blur goes as the root
+    assert np.allclose(np.divide(blurs[1:], blurs[:-1]), 2.0, rtol=0.15)
+
+
+def test_diffraction_of_a_patch_by_transform() -> None:
+    """The far field of a Gaussian patch, by a sum over the patch."""
+    wavelength, patch = 0.65, 1.7
+    x = np.linspace(-12, 12, 2001)
+    field = np.exp(-(x**2) / (4 * patch**2))
+    slope = np.linspace(-0.1, 0.1, 401)
+    q_z = 4 * np.pi / wavelength
+    power = np.abs(np.exp(1j * q_z * np.outer(slope, x)) @ field) ** 2
+    rms = np.sqrt(np.sum(power * slope**2) / np.sum(power))
+    assert rms == pytest.approx(diffraction(patch, wavelength), rel=1e-3)
+
+
+def test_table_keeps_the_slopes_of_each_axis() -> None:
+    i, j = np.mgrid[:192, :192]
+    rng = np.random.default_rng(2)
+    heights = np.zeros((192, 192))
+    for _ in range(60):
+        k, m = rng.integers(1, 5), rng.integers(4, 16)
+        heights += np.cos(2 * np.pi * (k * i + m * j) / 192 + rng.uniform(0, 7)) / m
+    surface = HeightMap(0.3 * heights, 0.9, periodic=True)
+    facets = facets_of(surface, 0.5, patch=0.5)
+    rms = slope_table(facets).slope_rms
+    expected = [np.hypot(s.std(), facets.blur) for s in (facets.slope_x, facets.slope_y)]
+    assert rms[1] > 1.3 * rms[0]
+    np.testing.assert_allclose(rms, expected, rtol=0.04)
+
+
+def test_terraces_follow_their_truth() -> None:
+    true = ground(0.3, n=160)
+    step = 0.35 * true.heights.std()
+    digitised = HeightMap(np.round(true.heights / step) * step, true.spacing)
+    views = np.deg2rad(np.arange(0.0, 71.0, 5.0))
+    at = (np.deg2rad(30.0), views, np.pi)
+    with pytest.warns(UserWarning, match="equal"):
+        found = fitting.predict(digitised, GLASS, wavelength=0.65)
+    whole = fitting.predict(true, GLASS, wavelength=0.65)
+    off = found.brdf(*at)[:, 0, 0] / whole.brdf(*at)[:, 0, 0] - 1
+    assert np.sqrt(np.mean(off**2)) < 0.12
+
+
+def test_interval_holds_the_prediction_and_grows_with_doubt() -> None:
+    surface = ground(0.25, n=96)
+    at = (0.6, np.array([0.2, 0.6, 0.9]), np.pi)
+    found = fitting.predict(surface, GLASS, wavelength=0.65, base_albedo=0.0)
+    low, high = found.interval(*at)
+    value = found.brdf(*at)[:, 0, 0]
+    assert np.all((low < value) & (value < high))
+    sure = fitting.predict(
+        surface, GLASS, wavelength=0.65, base_albedo=0.0, place=0.0, index_stderr=0.0
+    )
+    narrow = np.subtract(*sure.interval(*at)[::-1])
+    assert np.all(narrow < 0.8 * (high - low))
+
+
+def test_misfit_frees_gain_and_base_of_what_they_made() -> None:
+    curve = np.array([0.5, 0.2, 0.05, 0.01, 0.3])
+    off = misfit(curve, 0.7 * curve + 0.03 / np.pi)
+    assert off.gain == pytest.approx(0.7)
+    assert off.gain_base == pytest.approx(0.03)
+    assert off.gain_free < 1e-9
+    assert off.absolute > 0.2
+
+
+def test_bad_arguments_are_named() -> None:
+    with pytest.raises(TypeError, match="surface must be a HeightMap"):
+        fitting.predict(3.0, GLASS, wavelength=0.65)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="wavelength must be positive"):
+        fitting.predict(ground(0.2, n=64), GLASS, wavelength=-1.0)
+
+
+def test_free_density_of_a_scan_is_that_of_its_facets() -> None:
+    angles = np.deg2rad(
+        np.meshgrid([10.0, 45.0], np.arange(0.0, 76.0, 3.0), [180, 140, 60])
+    )
+    theta_i, theta_s, dphi = (a.ravel() for a in angles)
+    truth = MicrofacetModel(GLASS, slope_rms=0.22)
+    readings = 0.8 * truth.brdf(theta_i, theta_s, dphi)[..., 0, 0] + 0.03 / np.pi
+    found = free_density(theta_i, theta_s, dphi, readings, GLASS)
+    assert found.error < 0.02
+    assert found.gain == pytest.approx(0.8, rel=0.06)
+    assert found.diffuse_albedo == pytest.approx(0.03, rel=0.05)
+    # Rayleigh's law of |slope|
+    median = found.quantile(np.array([0.5]))[0]
+    assert median == pytest.approx(0.22 * np.sqrt(2 * np.log(2)), rel=0.05)
