@@ -25,7 +25,7 @@ from pbrdf.simulation.spectra import WORTHWHILE
 from pbrdf.surface.gaussian import GaussianSurface
 
 # Looks at a facet for each ray of a realisation
-LOOKS_PER_RAY = 0.5
+LOOKS_PER_RAY = 0.1
 # Cells of directions are no wider than these parts of a quarter and of a full circle
 LEAST_THETA, LEAST_DPHI = 30, 60
 # Flux below which hiding changes nothing
