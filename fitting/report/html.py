@@ -13,12 +13,23 @@ __all__ = ["bullets", "figure", "page", "paragraph", "png", "section", "table"]
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
-       padding: 0 1rem; color: #222; }
+       padding: 0 1rem; color: #222; overflow-wrap: anywhere; }
 h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
+.wide { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid #ddd; }
-th { font-weight: 600; } figure { margin: 1rem 0; } img { max-width: 100%; }
-figcaption, .note { color: #555; font-size: .9rem; }
+th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid #ddd;
+         min-width: 4rem; vertical-align: top; }
+th { font-weight: 600; } figure { margin: 1rem 0; } img, canvas { max-width: 100%; }
+figcaption, .note { color: #444; font-size: 15px; }
+pre { font-size: 14px; white-space: pre-wrap; background: #f4f4f4; padding: .6rem; }
+.viewer { display: flex; flex-wrap: wrap; gap: 1rem; align-items: center; }
+#disc { touch-action: pan-y; cursor: crosshair; }
+.controls label { display: inline-block; margin: 0 1rem .5rem 0; }
+select { font: inherit; max-width: 100%; } #value { font-weight: 600; min-height: 3em; }
+@media print {
+  body { max-width: none; margin: 0; } .controls { display: none; }
+  h2 { break-after: avoid; } table, figure, .viewer { break-inside: avoid; }
+}
 """
 
 
@@ -27,6 +38,7 @@ def page(title: str, sections: Iterable[str]) -> str:
     body = "\n".join(sections)
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(title)}</title><style>{_STYLE}</style></head>\n"
         f"<body><h1>{escape(title)}</h1>\n{body}\n</body></html>\n"
     )
@@ -54,7 +66,10 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
         for row in rows
     )
-    return f"<table><thead><tr>{head}</tr></thead>\n<tbody>{body}</tbody></table>"
+    return (
+        f'<div class="wide"><table><thead><tr>{head}</tr></thead>\n'
+        f"<tbody>{body}</tbody></table></div>"
+    )
 
 
 def png(drawing: "Figure") -> bytes:

@@ -8,8 +8,9 @@ import xarray as xr
 
 import data_io
 from fitting.estimate import Estimate
-from fitting.report import html
+from fitting.report import explorer, html
 from fitting.report.fit_files import calibrated
+from fitting.report.viewer import viewer
 from fitting.result.misfit import RULE
 from pbrdf import __version__
 from pbrdf.plots import histograms, scan_figure
@@ -52,10 +53,14 @@ def write_report(
     }
     for name, image in figures.items():
         (folder / name).write_bytes(image)
-    data_io.write_result(result_dataset(result), folder / "result.nc")
+    together = result_dataset(result)
+    if record is not None:
+        together.attrs["made_by"] = dict(record)
+    data_io.write_result(together, folder / "result.nc")
     data_io.write_model(result.model, folder / "model.toml", notes=_notes(result, record))
     times = {**(seconds or {}), **result.seconds}
-    page = html.page("Reflectance model", _sections(result, figures, inputs or {}, times))
+    sections = [*_sections(result, figures, inputs or {}, times), explorer.origin(record)]
+    page = html.page("Reflectance model", [*sections, explorer.glossary()])
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -140,6 +145,14 @@ def _sections(
     seconds: Mapping[str, float],
 ) -> Iterator[str]:
     statistics, fits = result.statistics, fit_columns(result)
+    both = {
+        "Analytical": result.analytic.as_dict(), "Monte Carlo": result.monte_carlo.as_dict()
+    }  # fmt: skip
+    yield html.section(
+        "Summary",
+        html.paragraph(" ".join(explorer.fit_summary(both))),
+        explorer.facts(result.simulation, inputs.get("scan", "not named")),
+    )
     yield html.section("What went in", html.table(("", ""), inputs.items()))
     yield html.section(
         "Surface",
@@ -174,11 +187,21 @@ def _sections(
             ],
         ),
         html.paragraph(f"Verdicts: {RULE}."),
+        *(
+            html.paragraph(title) + explorer.correlations(list(fit.values), fit.correlation)
+            for title, fit in fits.items()
+        ),
         html.figure(
             figures["scan.png"],
             "Scan, analytical curve (dashed) and Monte Carlo with all bounces (full, band: "
-            "95 %). Below: what the scan shows beyond each curve.",
+            "95 %). Below: what the scan shows beyond each curve, in standard errors where "
+            "the scan gives errors; grey: two of them.",
         ),
+    )
+    yield html.section(
+        "Hemisphere",
+        html.paragraph("The simulation, for a specular gain of 1 and no diffuse part."),
+        viewer(result.simulation),
     )
     yield html.section("What these data cannot tell", html.bullets(result.unknown))
     yield html.section(

@@ -1,0 +1,231 @@
+"""A page that explains any result: summary, hemisphere, fits, glossary, origin, data."""
+
+import base64
+import shlex
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from html import escape
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fitting.report import html
+from fitting.report.viewer import viewer
+from fitting.result.misfit import RULE
+from pbrdf import __version__
+from pbrdf.derived import element, in_plane
+from pbrdf.derived.elements import mueller
+from pbrdf.plots.sheet import scene_of
+
+__all__ = [
+    "correlations",
+    "explorer",
+    "facts",
+    "fit_summary",
+    "glossary",
+    "origin",
+    "page_of",
+]
+
+_GLOSSARY = (
+    ("M00 ... M33", "1/sr", "Mueller BRDF: scattered radiance over irradiance"),
+    ("M10, M20", "1/sr", "polarised parts of what unpolarised light makes: s over "
+     "p, and at 45 degrees"),
+    ("DOLP", "1", "degree of linear polarisation, √(M10² + M20²) / M00"),
+    ("AOLP", "deg", "angle of polarisation from the direction s towards p"),
+    ("theta_i, theta_s", "deg", "zenith angles of source and detector"),
+    ("dphi", "deg", "azimuth from source to detector: 180 specular, 0 back to the source"),
+    ("view angle", "deg", "zenith of the detector in the plane, positive forward"),
+    ("slope_rms", "1", "rms slope of the surface along one axis"),
+    ("height_rms, corr_length", "um", "rms height; lag where its correlation is 1/e"),
+    ("specular_gain", "1", "factor on the surface reflection"),
+    ("diffuse_albedo", "1", "Lambertian part: adds diffuse_albedo / π to M00"),
+    ("n, kappa", "1", "refractive index n + i kappa"),
+    ("standard error, ±", "", "one standard deviation of the estimate"),
+    ("chi2 / dof", "1", "mean square of the residuals in standard errors; 1 is expected"),
+    ("misfit", "", f"verdict on the curve. {RULE}"),
+)  # fmt: skip
+
+
+def page_of(result: xr.Dataset, name: str) -> str:
+    """Return the whole page of a result that `read_result` gave."""
+    return html.page(f"Report: {name}", explorer(result, name))
+
+
+def explorer(result: xr.Dataset, name: str) -> Iterator[str]:
+    """Yield the sections of the page of a result."""
+    fits = {
+        title: result.attrs[key]
+        for key, title in (
+            ("analytic_fit", "Analytical"), ("monte_carlo_fit", "Monte Carlo"),
+        )
+        if isinstance(result.attrs.get(key), Mapping)
+    }  # fmt: skip
+    sentences = [_what(result), _how_sure(result)]
+    if fits:
+        sentences = [*fit_summary(fits), sentences[-1]]
+    yield html.section("Summary", html.paragraph(" ".join(sentences)), facts(result, name))
+    if "theta_s" in mueller(result)[0].dims:
+        yield html.section("Hemisphere", viewer(result), _download(result))
+    for title, fit in fits.items():
+        yield html.section(f"{title} fit", *_fit(fit))
+    notes = result.attrs.get("warnings") or []
+    if notes:
+        yield html.section("Warnings", html.bullets(map(str, notes)))
+    yield origin(result.attrs.get("made_by"), result)
+    yield glossary()
+
+
+def fit_summary(fits: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return the verdict, the answer and where it is held, a sentence each."""
+    title = list(fits)[-1]
+    answer = fits[title]
+    verdict = answer["misfit"]["verdict"]
+    said = [
+        f"The {title} curve follows the scan with the verdict “{verdict}”, over "
+        f"{answer['dof']} degrees of freedom, by the rule below."
+    ]
+    values = ", ".join(
+        f"{name} {_estimate(one)}" for name, one in answer["parameters"].items()
+    )
+    said.append(
+        f"The answer is the column {title}, which has all bounces: {values}; it is held in "
+        "result.nc, attribute monte_carlo_fit."
+    )
+    if "Analytical" in fits and title != "Analytical":
+        other = ", ".join(
+            f"{name} {_estimate(one)}"
+            for name, one in fits["Analytical"]["parameters"].items()
+        )
+        said[-1] = said[-1].rstrip(".") + (
+            f"; model.toml holds the analytical fit instead, for programs that take a "
+            f"formula: {other}."
+        )
+    return said
+
+
+def facts(result: xr.Dataset, name: str) -> str:
+    """Return a table of date, sample, incidences and wavelengths."""
+    rows = [
+        ("sample", name),
+        ("report written", f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"),
+        ("scene", scene_of(result) or "not recorded"),
+    ]
+    if "theta_i" in result.coords:
+        angles = np.rad2deg(np.unique(result.theta_i.values))
+        rows.append(("incidence [deg]", ", ".join(f"{a:.4g}" for a in angles)))
+    waves = np.array([])
+    if "wavelength" in result.coords:
+        waves = np.atleast_1d(result.wavelength.values)
+    listed = ", ".join(f"{w:.6g}" for w in waves)
+    rows.append(("wavelength [um]", listed or "not given"))
+    rows.append(("program", f"pbrdf {result.attrs.get('version', __version__)}"))
+    return html.table(("", ""), rows)
+
+
+def correlations(names: list[str], matrix: Any) -> str:
+    """Return the correlations of fitted parameters as a table."""
+    rows = [
+        (name, *("unknown" if v is None else f"{float(v):.2f}" for v in row))
+        for name, row in zip(names, matrix, strict=True)
+    ]
+    return html.table(("correlation", *names), rows)
+
+
+def glossary() -> str:
+    """Return a section with every symbol."""
+    return html.section("Glossary", html.table(("symbol", "unit", "meaning"), _GLOSSARY))
+
+
+def origin(record: Any, result: xr.Dataset | None = None) -> str:
+    """Return inputs with their hashes, and the command that makes the result again."""
+    if not isinstance(record, Mapping):
+        seed = (
+            "" if result is None else f" Seed {result.attrs.get('seed', 'not recorded')}."
+        )
+        scene = "" if result is None else str(result.attrs.get("scene", ""))
+        text = f"<pre>{escape(scene)}</pre>" if scene else ""
+        told = html.paragraph(f"Simulated from the scene below.{seed}")
+        return html.section("How to make it again", told, text)
+    files = [
+        (one["role"], one["name"], one.get("sha256", "an entry of a database"))
+        for one in record["inputs"]
+    ]
+    words = ["pbrdf", str(record["command"])]
+    words += [one["name"] for one in record["inputs"] if one["role"] != "material"]
+    for key, value in record["options"].items():
+        option = f"--{key.replace('_', '-')}"
+        if isinstance(value, bool):
+            words += [option] if value else []
+        else:
+            words += [option, str(value)]
+    return html.section(
+        "How to make it again",
+        html.table(("input", "file", "SHA-256"), files),
+        f"<pre>{escape(shlex.join(words))}</pre>",
+        html.paragraph(f"Made by {record['program']}. Options by their names in Python."),
+    )
+
+
+def _what(result: xr.Dataset) -> str:
+    value, _ = mueller(result)
+    scene = scene_of(result)
+    of = f" of a {scene}" if scene else ""
+    count = value.sizes.get("theta_i", 1)
+    return f"This is the simulated reflectance{of} at {count} incidence{'s'[: count - 1]}."
+
+
+def _how_sure(result: xr.Dataset) -> str:
+    one = element(result, "M00")
+    if one.stderr is None:
+        return "The result holds no errors."
+    lit = (one.value > 0.1 * float(one.value.max())).values
+    part = 100 * (one.stderr.values / one.value.values)[lit]
+    return (
+        f"Above a tenth of its peak M00 is known to {np.nanmedian(part):.2g} % in "
+        f"the median bin and {np.nanmax(part):.2g} % in the worst (one standard error)."
+    )
+
+
+def _estimate(one: Mapping[str, Any]) -> str:
+    value, error = one["value"], one["stderr"]
+    if value is None or error is None:
+        return "not determined"
+    return f"{value:.4g} ± {error:.2g}"
+
+
+def _fit(fit: Mapping[str, Any]) -> Iterator[str]:
+    rows = [(name, _estimate(one)) for name, one in fit["parameters"].items()]
+    rows += [("misfit", str(fit["misfit"]["verdict"])), ("noise", str(fit["noise"]))]
+    yield html.table(("parameter", "value ± standard error"), rows)
+    yield correlations(list(fit["parameters"]), fit["correlation"])
+    yield html.paragraph(f"Verdicts: {RULE}.")
+    yield html.bullets(map(str, fit["warnings"]))
+
+
+def _download(result: xr.Dataset) -> str:
+    """Return a link that holds the cuts in the plane as a table."""
+    table = in_plane(result)
+    columns = {
+        n: element(table, n).value for n in ("M00", "M10", "M20") if _holds(table, n)
+    }
+    frame = xr.Dataset(columns).to_dataframe().reset_index()
+    for angle in [c for c in ("theta_i", "theta_view", "phi_i") if c in frame]:
+        frame[angle] = np.rad2deg(frame[angle])
+    frame = frame.rename(
+        columns={
+            "theta_i": "theta_i_deg", "theta_view": "theta_view_deg", "phi_i": "phi_i_deg",
+            "wavelength": "wavelength_um",
+        }
+    )  # fmt: skip
+    text = frame.to_csv(index=False, float_format="%.6g")
+    data = base64.b64encode(text.encode()).decode("ascii")
+    return (
+        f'<p><a download="in_plane.csv" href="data:text/csv;base64,{data}">Download the '
+        "cuts in the plane of incidence (CSV)</a></p>"
+    )
+
+
+def _holds(result: xr.Dataset, name: str) -> bool:
+    return "IQUV"[int(name[1])] in mueller(result)[0].stokes_out.values
