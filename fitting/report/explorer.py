@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fitting.report import html
-from fitting.report.viewer import viewer
+from fitting.report.viewer import hemisphere_view
 from fitting.result.misfit import RULE
 from pbrdf import __version__
 from pbrdf.derived import element, in_plane
@@ -20,12 +20,12 @@ from pbrdf.plots.sheet import scene_of
 
 __all__ = [
     "correlations",
-    "explorer",
     "facts",
     "fit_summary",
     "glossary",
     "origin",
     "page_of",
+    "sections_of",
 ]
 
 _GLOSSARY = (
@@ -50,10 +50,10 @@ _GLOSSARY = (
 
 def page_of(result: xr.Dataset, name: str) -> str:
     """Return the whole page of a result that `read_result` gave."""
-    return html.page(f"Report: {name}", explorer(result, name))
+    return html.page(f"Report: {name}", sections_of(result, name))
 
 
-def explorer(result: xr.Dataset, name: str) -> Iterator[str]:
+def sections_of(result: xr.Dataset, name: str) -> Iterator[str]:
     """Yield the sections of the page of a result."""
     fits = {
         title: result.attrs[key]
@@ -67,7 +67,7 @@ def explorer(result: xr.Dataset, name: str) -> Iterator[str]:
         sentences = [*fit_summary(fits), sentences[-1]]
     yield html.section("Summary", html.paragraph(" ".join(sentences)), facts(result, name))
     if "theta_s" in mueller(result)[0].dims:
-        yield html.section("Hemisphere", viewer(result), _download(result))
+        yield html.section("Hemisphere", hemisphere_view(result), _download(result))
     for title, fit in fits.items():
         yield html.section(f"{title} fit", *_fit(fit))
     notes = result.attrs.get("warnings") or []

@@ -15,7 +15,7 @@ from pbrdf.derived.elements import mueller
 from pbrdf.derived.places import in_words
 from pbrdf.plots.limits import reach_of
 
-__all__ = ["viewer"]
+__all__ = ["hemisphere_view"]
 
 _ELEMENTS = ("M00", "M10", "M20", "DOLP")
 _BINS = ("theta_s", "dphi", "stokes_out", "stokes_in")
@@ -24,7 +24,7 @@ _MOST = 2_600_000
 _COLOURS = 33
 
 
-def viewer(result: xr.Dataset) -> str:
+def hemisphere_view(result: xr.Dataset) -> str:
     """Return a section's content: pictures over the hemisphere and in the plane.
 
     Where a result holds more hemispheres than a page can carry, some are chosen evenly and

@@ -10,7 +10,7 @@ import data_io
 from fitting.estimate import Estimate
 from fitting.report import explorer, html
 from fitting.report.fit_files import calibrated
-from fitting.report.viewer import viewer
+from fitting.report.viewer import hemisphere_view
 from fitting.result.misfit import RULE
 from pbrdf import __version__
 from pbrdf.plots import histograms, scan_figure
@@ -201,7 +201,7 @@ def _sections(
     yield html.section(
         "Hemisphere",
         html.paragraph("The simulation, for a specular gain of 1 and no diffuse part."),
-        viewer(result.simulation),
+        hemisphere_view(result.simulation),
     )
     yield html.section("What these data cannot tell", html.bullets(result.unknown))
     yield html.section(
