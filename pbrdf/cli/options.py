@@ -48,6 +48,7 @@ __all__ = [
     "incidences",
     "names",
     "numbers",
+    "result_file",
     "recorded",
 ]
 
@@ -286,6 +287,22 @@ def recorded(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options of a command by the names that say their units."""
     kept = {name: value for name, value in given.items() if name not in _UNRECORDED}
     return {_UNITS.get(name, name): value for name, value in kept.items()}
+
+
+def result_file(target: Path) -> Path:
+    """Return the name of a result file.
+
+    Raises
+    ------
+    ValueError
+        If its ending is that of another format than the one that is written.
+    """
+    if target.suffix != ".nc":
+        msg = (
+            f"--output must end in .nc (netCDF), got {target.name!r}. No other is written."
+        )
+        raise ValueError(msg)
+    return target
 
 
 def names(text: str) -> tuple[str, ...]:

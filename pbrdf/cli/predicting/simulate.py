@@ -55,7 +55,7 @@ def command(
     from pbrdf.cli.staging import staged_file
 
     loaded = pbrdf.load_scene(scene)
-    target_file = output or scene.with_suffix(".nc")
+    target_file = options.result_file(output or scene.with_suffix(".nc"))
     if target is None or n_rays is not None or realizations is not None:
         n_rays, realizations = n_rays or 100_000, realizations or 16
     waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")

@@ -76,7 +76,7 @@ def command(
         changed(loaded, dict(zip(axes, values, strict=True))) for values in combinations
     ]
     waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
-    target_file = output or scene.with_name(f"{scene.stem}-sweep.nc")
+    target_file = options.result_file(output or scene.with_name(f"{scene.stem}-sweep.nc"))
     results = []
     with staged_file(target_file, force=force) as stage, StageBars() as bars:
         for step, (variant, values) in enumerate(zip(scenes, combinations, strict=True)):
