@@ -48,8 +48,8 @@ __all__ = [
     "incidences",
     "names",
     "numbers",
-    "result_file",
     "recorded",
+    "result_file",
 ]
 
 
