@@ -216,6 +216,16 @@ def judge_surface(scene: Scene, angles: np.ndarray, waves: np.ndarray | None) ->
     return judge(roughness_of(scene.surface), angles, waves)
 
 
+def unjudged(scene: Scene, waves: np.ndarray | None) -> list[str]:
+    """Say in the result what `judge_surface` has no judgement of."""
+    if waves is None or not isinstance(scene.surface, MeshSurface):
+        return []
+    return [
+        "Whether geometric optics holds at these wavelengths is not judged for meshes: see "
+        "that facets sample a surface that is smooth on the scale of a wavelength."
+    ]
+
+
 def varies(scene: Scene) -> bool:
     """Whether realisations of the scene differ."""
     drawn = any(getattr(one, "random", False) for one in scene.contaminants)
