@@ -31,6 +31,10 @@ def known_steps(path: Path, spacing: Spacing | None) -> tuple[float, float]:
     return float(dx), float(dy)
 
 
+# Beyond any marker of missing points, whose largest is that of single precision. [um]
+MOST_HEIGHT = 1e60
+
+
 def build_map(path: Path, rows: np.ndarray, steps: tuple[float, float]) -> HeightMap:
     """Make a HeightMap of rows of constant y. [um]"""
     if rows.ndim != 2 or min(rows.shape) < 2:
@@ -38,6 +42,12 @@ def build_map(path: Path, rows: np.ndarray, steps: tuple[float, float]) -> Heigh
         raise DataFileError(path, problem, "A single line of heights is a profile.")
     # Some programs write infinity for what was not measured
     rows = np.where(np.isinf(rows), np.nan, rows)
+    highest = float(np.nanmax(np.abs(rows), initial=0.0))
+    if highest > MOST_HEIGHT:
+        problem = f"expected heights, got values of up to {highest:.3g} um"
+        raise DataFileError(
+            path, problem, "The file is damaged, or of another number type."
+        )
     if np.isnan(rows).all():
         problem = "expected heights, every point is marked missing"
         raise DataFileError(path, problem, "Export the map again.")

@@ -140,6 +140,8 @@ def trace(  # noqa: PLR0913  (what one may want to choose of a run)
                 # Averaged over azimuth, an isotropic surface is its own mirror image
                 fold=phi_i is None,
                 workers=workers,
+                # Every index sees the same paths, one as well as many
+                variance_reduction=False,
             )
         runs.append(run if len(nodes) > 1 else run.expand_dims(wavelength=keys[:1]))
         if progress is not None:

@@ -37,7 +37,7 @@ class Scene:
 
     Examples
     --------
-    >>> from pbrdf.contaminants import Film
+    >>> from pbrdf import Film, HeightMap
     >>> scene = Scene(HeightMap.flat(size=(10.0, 10.0)), "bk7", Film(thickness=5.0))
     >>> scene.substrate.name, scene.contaminants[0].material.name
     ('bk7', 'water')

@@ -6,6 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
 
+# Runs are compared ray for ray, over surfaces small and steep on purpose
+pytestmark = pytest.mark.filterwarnings("ignore:A period of:pbrdf.errors.AccuracyWarning")
 BINS = {"n_theta": 18, "n_dphi": 24}
 SURFACE = GaussianSurface(
     shape=(128, 96), spacing=(1.0, 1.2), corr_length=(12.0, 16.0), slope_rms=0.4
