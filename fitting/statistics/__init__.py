@@ -1,7 +1,8 @@
 """Statistics of a surface from its profile or map, each with an interval."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from pbrdf._lazy import loader
 
 if TYPE_CHECKING:
     from fitting.statistics.result import SurfaceStatistics
@@ -14,9 +15,4 @@ _HOME = {
     "surface_statistics": "fitting.statistics.surface",
 }
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        msg = f"module {__name__!r} has no attribute {name!r}"
-        raise AttributeError(msg)
-    return getattr(import_module(_HOME[name]), name)
+__getattr__ = loader(__name__, _HOME)

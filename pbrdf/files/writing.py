@@ -143,13 +143,16 @@ def _take_name(stage: Path, path: Path) -> None:
 
 
 def _prefix(path: Path) -> str:
-    host = re.sub(r"[^\w]", "-", socket.gethostname())[:40] or "host"
-    return f".{path.stem[:80]}.part-{host}-{os.getpid()}-"
+    return f".{path.stem[:80]}.part-{_host()}-{os.getpid()}-"
+
+
+def _host() -> str:
+    return re.sub(r"[^\w]", "-", socket.gethostname())[:40] or "host"
 
 
 def _clear_leftovers(folder: Path) -> None:
     """Remove what processes of this machine that no longer run have left half written."""
-    host = re.sub(r"[^\w]", "-", socket.gethostname())[:40] or "host"
+    host = _host()
     with suppress(OSError):
         for entry in folder.iterdir():
             found = _PART.match(entry.name)
