@@ -3,6 +3,7 @@
 import numpy as np
 
 from data_io.goniometer.scan import ELEMENTS, INTENSITIES, NORMALISED, STDERR, Scan
+from data_io.goniometer.scatter import curve_keys, standard_errors
 from pbrdf.errors import DataFileError
 
 __all__ = ["check"]
@@ -15,8 +16,8 @@ _WAVELENGTH_RANGE = (0.01, 100.0)
 _DOLP_TOLERANCE = 0.05
 # Part of the brightest reading below which noise may exceed the signal
 _DARK = 1e-3
-# Readings below this part of the brightest are dark, and this many tell their noise
-_DIM, _ENOUGH = 0.1, 8
+# Standard errors that are beyond noise
+_FAR = 5.0
 
 
 def check(scan: Scan) -> None:
@@ -137,21 +138,24 @@ def _negative_cure(name: str) -> str:
 
 
 def _noise(scan: Scan, name: str) -> np.ndarray:
-    """Return how far below zero noise may take each reading: five standard errors.
-
-    Where the file states none, they are those of the dark readings, from their second
-    differences: a smooth curve has none, and noise has six times its variance.
-    """
+    """Return how far below zero noise may take each reading: five standard errors."""
     values = scan.values[name]
     if name.endswith(STDERR) or name == "DOLP":
         return np.zeros(values.size)
+    stated = scan.values.get(name + STDERR, np.full(values.size, np.nan))
     darkest = _DARK * np.nanmax(values, initial=0.0)
-    stated = 5.0 * scan.values.get(name + STDERR, np.full(values.size, np.nan))
-    dark = values[np.isfinite(values) & (values < _DIM * np.nanmax(values, initial=0.0))]
-    if dark.size >= _ENOUGH:
-        steps = np.abs(np.diff(dark, n=2))
-        darkest = max(darkest, 5.0 * 1.4826 * float(np.median(steps)) / np.sqrt(6.0))
-    return np.where(np.isfinite(stated), stated, darkest)
+    scatter = _FAR * np.nan_to_num(_errors(scan, name))
+    return np.where(np.isfinite(stated), _FAR * stated, np.maximum(darkest, scatter))
+
+
+def _errors(scan: Scan, name: str) -> np.ndarray:
+    """Return the standard errors of a column: as stated, by its scatter, or NaN."""
+    curve, view = curve_keys(
+        scan.theta_i, scan.theta_s, scan.dphi, scan.phi_i, scan.wavelength
+    )
+    stated = scan.values.get(name + STDERR)
+    brightness = scan.values.get("M00")
+    return standard_errors(scan.values[name], stated, curve, view, brightness=brightness)
 
 
 def _check_normalisation(scan: Scan) -> None:
@@ -162,8 +166,8 @@ def _check_normalisation(scan: Scan) -> None:
     for name in ELEMENTS[1:]:
         if name not in scan.values:
             continue
-        margin = 5 * np.nan_to_num(scan.values.get(name + STDERR, np.zeros(intensity.size)))
-        larger = np.abs(scan.values[name]) > intensity + margin
+        error = np.hypot(*(np.nan_to_num(_errors(scan, n)) for n in (name, "M00")))
+        larger = np.abs(scan.values[name]) > intensity + _FAR * error
         compared = np.isfinite(scan.values[name]) & np.isfinite(intensity)
         if compared.any() and larger.sum() > 0.5 * compared.sum():
             row = int(np.argmax(larger))
@@ -173,7 +177,7 @@ def _check_normalisation(scan: Scan) -> None:
             )
             cure = "If the elements are divided by M00, give --normalised."
             raise scan.fault(larger, name, problem, cure)
-        impossible = _beyond(scan, name, intensity)
+        impossible = _beyond(scan, name, intensity, error)
         if impossible.any():
             row = int(np.argmax(impossible))
             problem = (
@@ -200,21 +204,19 @@ def _check_ratios(scan: Scan) -> None:
             raise scan.fault(wrong, name, problem, cure)
 
 
-def _beyond(scan: Scan, name: str, intensity: np.ndarray) -> np.ndarray:
+def _beyond(scan: Scan, name: str, intensity: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Tell where an element exceeds M00 by more than its error can explain.
 
-    Where the file states no errors, a factor of two above what a detector still sees.
+    Where neither file nor scatter tells errors, a factor of two above what a detector sees.
     """
     size = np.abs(scan.values[name])
-    nothing = np.zeros(size.size)
-    error = np.hypot(
-        np.nan_to_num(scan.values.get(name + STDERR, nothing)),
-        np.nan_to_num(scan.values.get("M00" + STDERR, nothing)),
-    )
     floor = _DARK * np.nanmax(intensity, initial=0.0)
-    stated = size > 1.02 * intensity + 5.0 * error
-    unstated = size > 2.0 * intensity + floor
-    return np.asarray(np.where(error > 0.0, stated, unstated))
+    stated = np.zeros(size.size, dtype=bool)
+    for column in (name + STDERR, "M00" + STDERR):
+        stated |= np.nan_to_num(scan.values.get(column, np.zeros(size.size))) > 0.0
+    beyond = size > 1.02 * intensity + _FAR * error
+    twice = size > 2.0 * np.abs(intensity) + floor
+    return np.asarray(np.where(stated, beyond, beyond & twice))
 
 
 def _check_dolp(scan: Scan) -> None:

@@ -1,4 +1,4 @@
-"""Single readings: polarisation, limits of the instrument, noise, repeats, wavelengths."""
+"""Single readings: limits of the instrument, noise, repeats, wavelengths."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -11,68 +11,9 @@ from fitting.checks.finding import Finding
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "check_limits", "check_noise", "check_polarisation", "check_repeats",
-    "check_wavelengths",
-]  # fmt: skip
+__all__ = ["check_limits", "check_noise", "check_repeats", "check_wavelengths"]
 
 _REPEATS = 3
-
-
-def check_polarisation(scan: "xr.Dataset") -> list[Finding]:
-    """No surface polarises more light than it reflects."""
-    found = brightness(scan)
-    findings = []
-    for i in range(4):
-        for j in range(4):
-            name = f"M{i}{j}"
-            if found is None or name == "M00" or name not in scan:
-                continue
-            value, stderr = np.asarray(scan[name].values, float), _stderr(scan, name)
-            error = np.hypot(np.nan_to_num(stderr), np.nan_to_num(found[1]))
-            # Without stated errors: noise of a quarter, or of a dark reading
-            floor = 0.02 * np.nanmax(found[0], initial=0.0)
-            margin = np.where(error > 0, 5.0 * error, floor + 0.25 * np.abs(found[0]))
-            beyond = np.abs(value) > np.abs(found[0]) + margin
-            if beyond.any():
-                row = int(np.argmax(np.abs(value) - np.abs(found[0])))
-                findings.append(
-                    Finding(
-                        name="polarisation", severity="error",
-                        what=f"{name} exceeds M00 in {beyond.sum()} readings, at worst "
-                        f"{value[row]:.4g} beside {found[0][row]:.4g} at "
-                        f"{_place(scan, row)}",
-                        suspects="elements divided by M00, or columns exchanged",
-                        cure="Give --normalised if they are divided by M00; or "
-                        "--accept polarisation.",
-                    )
-                )  # fmt: skip
-    return findings + _biased_dolp(scan)
-
-
-def _biased_dolp(scan: "xr.Dataset") -> list[Finding]:
-    """Say by how much noise lifts a degree of polarisation, which cannot be negative.
-
-    For Q and U of error s the mean of sqrt(Q^2 + U^2)/I at polarisation p is about
-    p + s^2 / (2 p), and 1.25 s at none.
-    """
-    if "DOLP" not in scan or "DOLP_stderr" not in scan:
-        return []
-    value, stderr = np.asarray(scan["DOLP"].values, float), _stderr(scan, "DOLP")
-    weak = (value < 3.0 * stderr) & np.isfinite(value)
-    if not weak.any():
-        return []
-    true = np.sqrt(np.maximum(value**2 - stderr**2, 0.0))
-    bias = float(np.median((value - true)[weak]))
-    return [
-        Finding(
-            name="dolp", severity="warning",
-            what=f"{weak.sum()} of {np.isfinite(value).sum()} readings of DOLP lie within "
-            f"three standard errors of zero, where noise lifts them, by about {bias:.2g}",
-            suspects="a degree of polarisation computed from noisy Q and U",
-            cure="Give signed Q/I (column m10) in place of DOLP: it has no such bias.",
-        )
-    ]  # fmt: skip
 
 
 def check_limits(curves: Sequence[Curve]) -> list[Finding]:
@@ -225,18 +166,3 @@ def check_wavelengths(scan: "xr.Dataset") -> list[Finding]:
                 )
             )  # fmt: skip
     return findings
-
-
-def _stderr(scan: "xr.Dataset", name: str) -> np.ndarray:
-    column = f"{name}_stderr"
-    size = scan.sizes["geometry"]
-    return (
-        np.asarray(scan[column].values, float) if column in scan else np.full(size, np.nan)
-    )
-
-
-def _place(scan: "xr.Dataset", row: int) -> str:
-    angles = (
-        np.degrees(float(scan[n].values[row])) for n in ("theta_i", "theta_s", "dphi")
-    )
-    return "theta_i {:.4g}, theta_s {:.4g}, dphi {:.4g} deg".format(*angles)

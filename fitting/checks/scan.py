@@ -7,10 +7,10 @@ from fitting.checks.curves import curves_of
 from fitting.checks.directions import check_exchange, check_reciprocity
 from fitting.checks.energy import check_energy
 from fitting.checks.finding import Finding, PhysicsError
+from fitting.checks.polarisation import check_polarisation
 from fitting.checks.readings import (
     check_limits,
     check_noise,
-    check_polarisation,
     check_repeats,
     check_wavelengths,
 )

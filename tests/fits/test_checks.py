@@ -1,5 +1,6 @@
 """What a look at a scan finds: each slip with its option, and nothing in good scans."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose
 
-from data_io import read_goniometer
+from data_io import read_goniometer, write_goniometer
 from fitting import PhysicsError, check_scan, fit
 from fitting.checks.curves import curves_of
 from fitting.checks.energy import reflectance_bounds
@@ -100,6 +101,57 @@ def test_polarisation_beyond_the_light():
     error = check_scan(scan)[0]
     assert (error.name, error.severity) == ("polarisation", "error")
     assert "M10 exceeds M00" in error.what
+
+
+def dark_scan(seed, stated):
+    """A black surface: away from the lobe M00 and M10 are the noise of the instrument."""
+    scan = scan_of(
+        MicrofacetModel(Material(1.5, 0.2), slope_rms=0.05), views=np.arange(-75, 76, 2.5)
+    )
+    rng = np.random.default_rng(seed)
+    noise = np.hypot(1e-3 * float(scan.M00.max()), 0.02 * scan.M00.values)
+    for name in ("M00", "M10"):
+        values = scan[name].values + rng.normal(0.0, noise)
+        scan = scan.assign({name: ("geometry", values)})
+        if stated:
+            scan = scan.assign({f"{name}_stderr": ("geometry", noise)})
+    return scan
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_noise_may_take_an_element_beyond_a_dark_m00(tmp_path, stated):
+    for seed in range(6):
+        scan = dark_scan(seed, stated)
+        assert (abs(scan.M10) > scan.M00).sum() > 10
+        assert "polarisation" not in names(scan)
+        write_goniometer(scan, tmp_path / "s.csv")
+        again = read_goniometer(tmp_path / "s.csv")
+        assert_allclose(again.M10, scan.M10)
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_wrong_scale_shows_through_the_noise(stated):
+    scan = dark_scan(3, stated)
+    lit = 0.05 * float(scan.M00.max()) < scan.M00
+    ratio = scan.assign(M10=(scan.M10 / scan.M00).where(lit, 0.3))
+    (found,) = [f for f in check_scan(ratio) if f.name == "polarisation"]
+    assert "standard errors beyond" in found.what
+    assert ("estimated from the scatter" in found.what) is not stated
+    # Beyond M00 by no more than 2 errors anywhere, but everywhere
+    rng = np.random.default_rng(4)
+    flat = scan_of(views=np.arange(-75, 76, 2.5))
+    noise = np.full(flat.sizes["geometry"], 0.05)
+    parts = {
+        "M00": ("geometry", 0.2 + rng.uniform(-0.05, 0.05, noise.size)),
+        "M10": ("geometry", 0.26 + rng.uniform(-0.05, 0.05, noise.size)),
+    }
+    errors = {f"{name}_stderr": ("geometry", noise) for name in ("M00", "M10") if stated}
+    (found,) = [
+        f for f in check_scan(flat.assign(**parts, **errors)) if f.name == "polarisation"
+    ]
+    assert re.search(
+        "in the sum of 3[01] readings of one side, .* by .* errors", found.what
+    )
 
 
 def test_a_cosine_breaks_reciprocity_as_itself():

@@ -1,0 +1,156 @@
+"""Polarised against all light: elements beyond M00, degrees lifted by noise."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from data_io.goniometer.scatter import curve_keys, standard_errors
+from fitting.checks.curves import brightness
+from fitting.checks.finding import Finding
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["check_polarisation"]
+
+# Standard errors that are beyond noise
+_FAR = 5.0
+
+
+def check_polarisation(scan: "xr.Dataset") -> list[Finding]:
+    """No surface polarises more light than it reflects, but for noise.
+
+    An element may exceed M00 by five standard errors in a reading, and by as many in the
+    sum over a curve, where noise averages out and a wrong scale does not.
+    """
+    found = brightness(scan)
+    findings = []
+    for name in (f"M{i}{j}" for i in range(4) for j in range(4)):
+        if found is None or name == "M00" or name not in scan:
+            continue
+        value = np.asarray(scan[name].values, float)
+        bright, error, estimated = _errors_of(scan, name, found)
+        excess = np.abs(value) - bright
+        # Where no error is stated a quarter more, where nothing tells it a dark reading too
+        allowed, quarter = _FAR * error, 0.25 * np.abs(bright)
+        if estimated:
+            allowed = np.maximum(allowed, quarter)
+        blind = 0.02 * np.nanmax(bright, initial=0.0) + quarter
+        beyond = excess > np.where(error > 0, allowed, blind)
+        if beyond.any():
+            row = int(np.argmax(np.where(beyond, excess, -np.inf)))
+            what = (
+                f"{name} exceeds M00 in {beyond.sum()} of {np.isfinite(excess).sum()} "
+                f"readings, at worst {value[row]:.4g} beside {bright[row]:.4g} at "
+                f"{_place(scan, row)}{_size_of(excess[row], error[row], estimated)}"
+            )
+        else:
+            what = _sum_beyond(scan, name, bright, error, estimated)
+        if what:
+            findings.append(
+                Finding(
+                    name="polarisation", severity="error", what=what,
+                    suspects="elements divided by M00, or columns exchanged",
+                    cure="Give --normalised if they are divided by M00; or "
+                    "--accept polarisation.",
+                )
+            )  # fmt: skip
+    return findings + _biased_dolp(scan)
+
+
+def _errors_of(
+    scan: "xr.Dataset", name: str, found: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Return M00, the error of |element| - M00, and whether the scatter had to tell it."""
+    bright, stated = found
+    curve, view = _curves(scan)
+    value, own = np.asarray(scan[name].values, float), _stderr(scan, name)
+    parts = (
+        standard_errors(bright, stated, curve, view),
+        standard_errors(value, own, curve, view, brightness=bright),
+    )
+    estimated = not (np.isfinite(stated).any() and np.isfinite(own).any())
+    return bright, np.hypot(*map(np.nan_to_num, parts)), estimated
+
+
+def _curves(scan: "xr.Dataset") -> tuple[np.ndarray, np.ndarray]:
+    """Return the curve and the view of each reading."""
+    size = scan.sizes["geometry"]
+
+    def column(name: str) -> np.ndarray | None:
+        if name not in scan.coords:
+            return None
+        return np.broadcast_to(np.asarray(scan[name].values, float), (size,))
+
+    angles = [np.degrees(scan[n].values) for n in ("theta_i", "theta_s", "dphi")]
+    return curve_keys(*angles, column("phi_i"), column("wavelength"))
+
+
+def _size_of(excess: float, error: float, estimated: bool) -> str:
+    if error <= 0:
+        return ""
+    how = ", estimated from the scatter" if estimated else ""
+    return f", {excess / error:.3g} standard errors beyond ({error:.2g} 1/sr{how})"
+
+
+def _sum_beyond(
+    scan: "xr.Dataset", name: str, bright: np.ndarray, error: np.ndarray, estimated: bool
+) -> str:
+    """Say by how much an element exceeds M00 in the sum over one half of a curve."""
+    curve, view = _curves(scan)
+    value = np.asarray(scan[name].values, float)
+    known = np.isfinite(value) & np.isfinite(bright) & (error > 0)
+    worst, said = _FAR, ""
+    for half in np.unique(2 * curve[known] + (view[known] > 0)):
+        here = known & (2 * curve + (view > 0) == half)
+        total, light = float(value[here].sum()), float(bright[here].sum())
+        far = (abs(total) - light) / np.sqrt(np.sum(error[here] ** 2))
+        if far > worst:
+            how = ", estimated from their scatter" if estimated else ""
+            row = int(np.flatnonzero(here)[0])
+            worst, said = far, (
+                f"{name} exceeds M00 in the sum of {here.sum()} readings of one side, "
+                f"{total:.4g} beside {light:.4g}, by {far:.3g} standard errors{how}, at "
+                f"theta_i {np.degrees(float(scan.theta_i.values[row])):.4g} deg"
+            )  # fmt: skip
+    return said
+
+
+def _biased_dolp(scan: "xr.Dataset") -> list[Finding]:
+    """Say by how much noise lifts a degree of polarisation, which cannot be negative.
+
+    For Q and U of error s the mean of sqrt(Q^2 + U^2)/I at polarisation p is about
+    p + s^2 / (2 p), and 1.25 s at none.
+    """
+    if "DOLP" not in scan or "DOLP_stderr" not in scan:
+        return []
+    value, stderr = np.asarray(scan["DOLP"].values, float), _stderr(scan, "DOLP")
+    weak = (value < 3.0 * stderr) & np.isfinite(value)
+    if not weak.any():
+        return []
+    true = np.sqrt(np.maximum(value**2 - stderr**2, 0.0))
+    bias = float(np.median((value - true)[weak]))
+    return [
+        Finding(
+            name="dolp", severity="warning",
+            what=f"{weak.sum()} of {np.isfinite(value).sum()} readings of DOLP lie within "
+            f"three standard errors of zero, where noise lifts them, by about {bias:.2g}",
+            suspects="a degree of polarisation computed from noisy Q and U",
+            cure="Give signed Q/I (column m10) in place of DOLP: it has no such bias.",
+        )
+    ]  # fmt: skip
+
+
+def _stderr(scan: "xr.Dataset", name: str) -> np.ndarray:
+    column = f"{name}_stderr"
+    size = scan.sizes["geometry"]
+    return (
+        np.asarray(scan[column].values, float) if column in scan else np.full(size, np.nan)
+    )
+
+
+def _place(scan: "xr.Dataset", row: int) -> str:
+    angles = (
+        np.degrees(float(scan[n].values[row])) for n in ("theta_i", "theta_s", "dphi")
+    )
+    return "theta_i {:.4g}, theta_s {:.4g}, dphi {:.4g} deg".format(*angles)
