@@ -44,14 +44,18 @@ class AnalyticModel:
         """Return every parameter at each geometry, shape (N,)."""
         known = np.isfinite(geometry.wavelength)
         wavelength = geometry.wavelength if known.all() else None
-        if self.model.material.dispersive and wavelength is None:
+        material = self.model.material
+        spectral = material.dispersive or callable(material.diffuse_albedo)
+        if spectral and wavelength is None:
             msg = (
-                "measurement must hold every wavelength where the material's index depends "
-                "on it, got none. Add wavelength_um or give n as a number."
+                "measurement must hold every wavelength where the material's constants "
+                "depend on it, got none. Add wavelength_um or give them as numbers."
             )
             raise ValueError(msg)
-        n, kappa = self.model.material.indices(wavelength)
-        values = {"n": n, "kappa": kappa, **self._slopes(), **self._numbers()}
+        n, kappa = material.indices(wavelength)
+        base = self.model.volume_albedo or material.albedo(wavelength)
+        numbers = self._numbers() | {"volume_albedo": base}
+        values = {"n": n, "kappa": kappa, **self._slopes(), **numbers}
         if self._split:
             values["orientation"] = 0.0
         return {
@@ -106,13 +110,11 @@ class AnalyticModel:
     def _numbers(self) -> dict[str, float]:
         """Return the model's other numbers."""
         skip = {"material", "slope_rms", "height_rms", *_RULES}
-        numbers = {
+        return {
             field.name: getattr(self.model, field.name)
             for field in fields(self.model)
             if field.name not in skip
         }
-        base = self.model.volume_albedo or float(self.model.material.albedo())
-        return {**numbers, "volume_albedo": base}
 
 
 @lru_cache(maxsize=64)

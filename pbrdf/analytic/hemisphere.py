@@ -75,7 +75,7 @@ def reflectance(
 
     zenith = float(checked_zenith("theta_i", theta_i))
     n, kappa = model.material.index(wavelength)
-    base = float(model.material.albedo())
+    base = float(model.material.albedo(wavelength))
     at = model.with_parameters(material=Material(n, kappa, diffuse_albedo=base))
     # Cubes of the variables crowd the nodes about the specular direction
     span = np.array([-zenith, pi / 2 - zenith])

@@ -118,19 +118,13 @@ class MicrofacetModel:
                 name, value, lambda v: (v >= 0) & (v <= 1), "lie in [0, 1] [1]",
                 "It is a fraction.",
             )  # fmt: skip
-        if callable(self.material.diffuse_albedo):
-            low, high = self.material.diffuse_albedo.valid_range
+        if self.volume_albedo and self.material.has_base:
+            given = self.material.diffuse_albedo
+            base = "from a table" if callable(given) else f"{given:g}"
             msg = (
-                "diffuse_albedo of the material must be one number in the analytical "
-                f"model, got a table from {low:g} to {high:g} um. Make a model for each "
-                "wavelength; the Monte Carlo takes tables."
-            )
-            raise ValueError(msg)
-        if self.volume_albedo and self.material.diffuse_albedo:
-            msg = (
-                f"volume_albedo must be 0 over a material with diffuse_albedo "
-                f"{self.material.diffuse_albedo:g}, got {self.volume_albedo:g}. "
-                "Both mean the base under the interface; give one of them."
+                f"volume_albedo must be 0 over a material with diffuse_albedo {base}, got "
+                f"{self.volume_albedo:g}. Both mean the base under the interface; give "
+                "one of them."
             )
             raise ValueError(msg)
         for name in ("specular_gain", "diffuse_albedo", "grazing_albedo"):
@@ -235,16 +229,21 @@ class MicrofacetModel:
         if self.height_rms is not None and wavelength is not None:
             for note in self.judge(np.unique(theta_i), np.unique(wavelength)).notes:
                 warnings.warn(note, AccuracyWarning, stacklevel=2)
-        shape, columns = flat_geometry(theta_i, theta_s, dphi, phi_i, n, kappa)
+        base = np.asarray(self.volume_albedo or self.material.albedo(wavelength))
+        shape, columns = flat_geometry(theta_i, theta_s, dphi, phi_i, n, kappa, base)
         matrices = _writable(out, (*shape, 4, 4))
-        if isinstance(self.slope_distribution, SlopeTable):
-            self._fill_tabulated(self.slope_distribution, columns, matrices.reshape(-1))
+        *columns, albedos = columns
+        if albedos.size == 1:
+            self._fill(columns, float(albedos[0]), matrices.reshape(-1))
             return matrices
-        # The kernel reads n and kappa with one stride
-        if columns[4].size != columns[5].size:
-            size = columns[0].size
-            columns[4:] = [np.broadcast_to(c, size).copy() for c in columns[4:]]
-        _fill(columns, self.surface(), matrices.reshape(-1))
+        # The kernels take one albedo, n and kappa for each geometry
+        flat = matrices.reshape(-1, 4, 4)
+        for albedo in np.unique(albedos):
+            here = albedos == albedo
+            part = np.empty((np.count_nonzero(here), 4, 4))
+            these = [one if one.size == 1 else one[here] for one in columns]
+            self._fill(these, float(albedo), part.reshape(-1))
+            flat[here] = part
         return matrices
 
     def judge(self, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike) -> Judgement:
@@ -288,8 +287,23 @@ height_rms.
         rough = gaussian_roughness(float(self.height_rms), slope)
         return judge(rough, zenith, np.atleast_1d(waves).ravel())
 
+    def _fill(self, columns: list[np.ndarray], albedo: float, out: np.ndarray) -> None:
+        """Fill in matrices over one albedo of the base."""
+        if isinstance(self.slope_distribution, SlopeTable):
+            self._fill_tabulated(self.slope_distribution, columns, albedo, out)
+            return
+        # The kernel reads n and kappa with one stride
+        if columns[4].size != columns[5].size:
+            size = columns[0].size
+            columns[4:] = [np.broadcast_to(c, size).copy() for c in columns[4:]]
+        _fill(columns, self.surface(albedo), out)
+
     def _fill_tabulated(
-        self, table: SlopeTable, columns: list[np.ndarray], out: np.ndarray
+        self,
+        table: SlopeTable,
+        columns: list[np.ndarray],
+        albedo: float,
+        out: np.ndarray,
     ) -> None:
         """Fill in matrices over measured slopes: the table gives densities and Lambda."""
         size = columns[0].size
@@ -301,7 +315,7 @@ height_rms.
         kernel.fill_tabulated(
             theta_i, theta_s, dphi, n, kappa, table.density_at(*slopes),
             table.overhang(theta_i, phi_i), table.overhang(theta_s, phi_i + dphi),
-            self.surface(), out,
+            self.surface(albedo), out,
         )  # fmt: skip
 
     def roughness(self) -> Roughness:
@@ -312,19 +326,18 @@ height_rms.
         norm = slope_norm(law, slope_x, slope_y)
         return Roughness(law, slope_x, slope_y, slope_x == slope_y, norm)
 
-    def surface(self) -> kernel.Surface:
-        """Numbers of the model as the kernels take them."""
+    def surface(self, albedo: float) -> kernel.Surface:
+        """Numbers of the model as the kernels take them; `albedo` is that of the base."""
         rule = SHADOWING[self.shadowing].code
         return kernel.Surface(
             self.roughness(),
             Shadowing(rule, self.shadow_omega, self.shadow_tau),
             float(self.specular_gain),
-            self._diffuse(),
+            self._diffuse(albedo),
         )
 
-    def _diffuse(self) -> Diffuse:
+    def _diffuse(self, volume_albedo: float) -> Diffuse:
         """Numbers of the terms (22) and (23)."""
-        volume_albedo = float(self.volume_albedo or self.material.albedo())
         return Diffuse(
             float(self.diffuse_albedo),
             float(self.grazing_albedo),

@@ -258,7 +258,7 @@ def observe(  # noqa: PLR0913  (the public signature)
     # Told in any case, but no surprise to one who set a low limit
     for note in [*late, *(cut if look.max_bounces >= MOST_BOUNCES else ())]:
         warnings.warn(note, AccuracyWarning, stacklevel=2)
-    notes += [*late, *cut, *arguments.unjudged(scene, waves)]
+    notes += [*late, *cut, *judged.remarks]
     result = to_dataset(
         seen,
         wavelength=waves,

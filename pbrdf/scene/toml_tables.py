@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from pbrdf.errors import DataFileError
+from pbrdf.files import companion
 from pbrdf.optics import library
 from pbrdf.optics.dispersion import Table
 from pbrdf.optics.materials import Material
-from pbrdf.optics.published import read
+from pbrdf.optics.published import read, read_constant
 from pbrdf.optics.published.formulas import Formula
 from pbrdf.optics.published.package import PREFIX, Entry
 
@@ -79,7 +80,7 @@ def material_table(material: Material) -> dict[str, Any]:
         table["absorbs_all"] = True
     n, kappa, albedo = material.n, material.kappa, material.diffuse_albedo
     table["diffuse_albedo"] = _constant_table("diffuse_albedo", albedo)
-    if isinstance(n, Entry):
+    if isinstance(n, Entry) and isinstance(kappa, Entry) and kappa.address == n.address:
         return table | {"file": f"{PREFIX}{n.address}"}
     grids = {c.wavelength for c in (n, kappa) if isinstance(c, Table)}
     if len(grids) == 1 and not isinstance(n, Formula):
@@ -97,6 +98,8 @@ def _constant_table(key: str, constant: Any) -> Any:
     """Write a constant that has wavelengths of its own, or follows a formula."""
     if isinstance(constant, Table):
         return {"wavelength_um": list(constant.wavelength), "values": list(constant.values)}
+    if isinstance(constant, Entry):
+        return {"file": f"{PREFIX}{constant.address}"}
     if isinstance(constant, Formula):
         return {
             "formula": constant.number,
@@ -112,16 +115,19 @@ def _constant_table(key: str, constant: Any) -> Any:
     return constant
 
 
-def _read_constant(key: str, value: Any) -> Any:
-    """Read a constant: a number, a list, a table of its own or a formula."""
+def _read_constant(key: str, value: Any, place: str, source: Path) -> Any:
+    """Read a constant: a number, a list, a table of its own, a file or a formula."""
     if not isinstance(value, dict):
         return value
+    if value.keys() == {"file"}:
+        where = f"[{place}] {key}"
+        return read_constant(_constants_file(value["file"], where, source), key)
     if value.keys() == {"wavelength_um", "values"}:
         return Table.of(key, value["wavelength_um"], value["values"])
     if key == "n" and value.keys() == {"formula", "coefficients", "range_um"}:
         low, high = value["range_um"]
         return Formula(value["formula"], tuple(value["coefficients"]), (low, high))
-    known = "wavelength_um and values"
+    known = "wavelength_um and values, or file"
     known += ", or formula, coefficients and range_um" if key == "n" else ""
     msg = f"{key} must have the keys {known}, got {', '.join(map(repr, value))}."
     raise ValueError(msg)
@@ -145,7 +151,7 @@ def read_material(table: Mapping[str, Any], place: str, source: Path) -> Materia
     wavelength = table.pop("wavelength_um", None)
     for key in ("n", "kappa", "diffuse_albedo"):
         if key in table:
-            table[key] = _read_constant(key, table[key])
+            table[key] = _read_constant(key, table[key], place, source)
     if wavelength is None:
         return Material(**table)
     return Material.from_table(wavelength=wavelength, **table)
@@ -158,14 +164,21 @@ def _material_of_file(table: Mapping[str, Any], place: str, source: Path) -> Mat
         problem = f"[{place}]: 'file' stands beside {', '.join(sorted(beside))}"
         cure = "The file has the constants; only diffuse_albedo and name may be added."
         raise DataFileError(source, problem, cure)
-    name = table["file"]
-    if not isinstance(name, str):
-        problem = f"[{place}]: 'file' must be a path, got {name!r}"
-        raise DataFileError(source, problem, "Write file = 'constants.csv'.")
-    material = read(name if name.startswith(PREFIX) else source.parent / name)
+    material = read(_constants_file(table["file"], f"[{place}]", source))
+    if "diffuse_albedo" in table and callable(material.diffuse_albedo):
+        problem = f"[{place}]: diffuse_albedo stands beside a file that has it"
+        raise DataFileError(source, problem, "Leave out one.")
     given = {
-        key: _read_constant(key, table[key])
+        key: _read_constant(key, table[key], place, source)
         for key in ("diffuse_albedo", "name")
         if key in table
     }
     return replace(material, **given)
+
+
+def _constants_file(name: Any, place: str, source: Path) -> str | Path:
+    """Return a file of optical constants, named from the scene's folder."""
+    if not isinstance(name, str):
+        problem = f"{place}: 'file' must be a path, got {name!r}"
+        raise DataFileError(source, problem, "Write file = 'constants.csv'.")
+    return name if name.startswith(PREFIX) else companion(source, name, place)

@@ -256,7 +256,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
     late += _thin_films(scene, moments[0], waves)
     for note in late:
         warnings.warn(note, AccuracyWarning, stacklevel=2)
-    notes += [*late, *arguments.unjudged(scene, waves)]
+    notes += [*late, *judged.remarks]
     # Told in any case, but no surprise to one who set the limit
     notes += _cut_light(moments, asked=max_bounces is not None)
     result = to_dataset(

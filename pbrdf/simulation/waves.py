@@ -52,7 +52,7 @@ def check_waves(
     if scene.contaminants:
         msg = "contaminants must be left out with wave: what lies on a surface is rays."
         raise ValueError(msg)
-    if any(material.diffuse_albedo for material in scene.materials):
+    if any(material.has_base for material in scene.materials):
         msg = (
             "diffuse_albedo of the substrate must be 0 with wave: its light is in the "
             "first bounce, which the waves replace."

@@ -10,7 +10,13 @@ from pbrdf.errors import check_seed, one_number, require
 from pbrdf.kernels.paths.shading import base_strength
 from pbrdf.scene.scene import Contamination, Scene
 from pbrdf.surface import FixedSurface, HeightMap, MeshSurface, Surface
-from pbrdf.validity import Judgement, judge, resolution_warnings, roughness_of
+from pbrdf.validity import (
+    Judgement,
+    judge,
+    resolution_warnings,
+    roughness_of,
+    roughness_of_mesh,
+)
 
 STOKES_COUNT = {"full": 4, "linear": 3, "unpolarized": 1}
 # A fixed surface has no realisations; its rays are dealt to this many independent batches
@@ -210,20 +216,13 @@ def scene_warnings(scene: Scene, drawn: int) -> list[str]:
 
 
 def judge_surface(scene: Scene, angles: np.ndarray, waves: np.ndarray | None) -> Judgement:
-    """Judge the surface of a scene, where a wavelength is known; not that of a mesh."""
-    if waves is None or isinstance(scene.surface, MeshSurface):
+    """Judge the surface of a scene, where a wavelength is known."""
+    if waves is None:
         return Judgement()
-    return judge(roughness_of(scene.surface), angles, waves)
-
-
-def unjudged(scene: Scene, waves: np.ndarray | None) -> list[str]:
-    """Say in the result what `judge_surface` has no judgement of."""
-    if waves is None or not isinstance(scene.surface, MeshSurface):
-        return []
-    return [
-        "Whether geometric optics holds at these wavelengths is not judged for meshes: see "
-        "that facets sample a surface that is smooth on the scale of a wavelength."
-    ]
+    surface = scene.surface
+    mesh = isinstance(surface, MeshSurface)
+    rough = roughness_of_mesh(surface) if mesh else roughness_of(surface)
+    return judge(rough, angles, waves)
 
 
 def varies(scene: Scene) -> bool:

@@ -7,12 +7,9 @@ import numpy as np
 
 from pbrdf.kernels.optics.absorbing import interface_elements
 from pbrdf.optics.materials import Material
+from pbrdf.validity.contaminants import ABSORBS, DEEP_ENOUGH
 
 __all__ = ["coherent_reflectance", "incoherent_reflectance", "thin_absorber_warnings"]
-
-# Powers add up in a film that hardly absorbs or lets nothing through; between the two the
-# waves in it overlap, and the sum of powers departs from their field
-ABSORBS, DEEP_ENOUGH = 0.05, 1.0
 
 Index = tuple[float, float]
 

@@ -13,6 +13,9 @@ LEAST_SIZE_PARAMETER = 400.0
 BANDWIDTH = 0.01
 # Index of the film where none is given, that of water [1]
 WATER = 4.0 / 3.0
+# Powers add up in a film that hardly absorbs or lets nothing through; between the two the
+# waves in it overlap, and the sum of powers departs from their field
+ABSORBS, DEEP_ENOUGH = 0.05, 1.0
 # Field from under a film, as a share of what entered, that interferes visibly
 LEAST_FIELD = 0.01
 
@@ -67,8 +70,12 @@ def judge_contaminants(
             # Nothing comes back through a mirror
             field = np.where((thickness < least) & np.isfinite(n), field, 0.0)
             numbers["film_field"] = np.fmax(numbers.get("film_field", field), field)
-            if field.max() > LEAST_FIELD:
-                w = int(np.argmax(field))
+            # Thin absorbers have a warning of their own, with the wave solution beside
+            depth = 4 * np.pi * kappa * thickness / waves
+            told = (kappa > ABSORBS) & (depth < DEEP_ENOUGH)
+            rest = np.where(told, 0.0, field)
+            if rest.max() > LEAST_FIELD:
+                w = int(np.argmax(rest))
                 notes.append(
                     f"A film of {thickness:.3g} um is thinner than {least[w]:.2g} um, "
                     f"three coherence lengths at {waves[w]:g} um and a bandwidth of "

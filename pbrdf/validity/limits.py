@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pbrdf.conventions import RESULT_VARIABLES
-from pbrdf.validity.roughness import Roughness
+from pbrdf.validity.roughness import FLAT, Roughness
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,8 +17,6 @@ MOST_COHERENT = 0.01
 # k R cos³θ from which the tangent plane holds: its error is of the order of the inverse.
 # At normal incidence a radius of five wavelengths
 LEAST_CURVATURE = 10.0 * np.pi
-# A surface that deviates less than this from its plane mirrors as the plane does [1]
-FLAT = 1e-4
 # Below this correlation of slopes from cell to cell, structure goes on below the cells
 LEAST_SMOOTH = 0.5
 # How far coarse grids change light of one bounce and of three and more, by the cells a
@@ -36,10 +34,14 @@ LEAST_CHANGE = 0.002
 
 @dataclass(frozen=True, kw_only=True)
 class Judgement:
-    """Numbers by the names of `RESULT_VARIABLES`, and what they mean in sentences."""
+    """Numbers by the names of `RESULT_VARIABLES`, and what they mean in sentences.
+
+    `notes` are warnings; `remarks` belong into the result but are no fault of it.
+    """
 
     numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 def judge(
@@ -67,7 +69,8 @@ theta_i is 23 with a typical radius of curvature R of 42.9 um, and should be abo
     """
     theta = np.atleast_1d(np.asarray(theta_i, dtype=np.float64))
     waves = np.atleast_1d(np.asarray(wavelength, dtype=np.float64))
-    cosine = np.cos(theta)[:, None]
+    # Bodies without ground look into all directions, whatever theta_i is
+    cosine = np.ones((theta.size, 1)) if rough.bodies else np.cos(theta)[:, None]
     radius = rough.curvature_radius(waves / 2)
     with np.errstate(over="ignore", invalid="ignore"):
         curvature = 2 * np.pi * radius / waves * cosine**3
@@ -84,13 +87,15 @@ theta_i is 23 with a typical radius of curvature R of 42.9 um, and should be abo
         return Judgement(numbers=numbers)
 
     notes = []
-    if share.max() > MOST_COHERENT:
-        a, w = np.unravel_index(np.argmax(share), share.shape)
+    # Flat parts mirror in the tracer too
+    missed = share - rough.flat
+    if missed.max() > MOST_COHERENT:
+        a, w = np.unravel_index(np.argmax(missed), missed.shape)
         notes.append(
-            f"{100 * share[a, w]:.2g} % of the light stays in a coherent specular beam at "
+            f"{100 * missed[a, w]:.2g} % of the light stays in a coherent specular beam at "
             f"{_place(theta[a], waves[w])} (rms height {rough.height_rms:.3g} um), which "
             "geometric optics spreads over the lobe"
-            f"{_others(share > MOST_COHERENT)}."
+            f"{_others(missed > MOST_COHERENT)}."
         )
     if curvature.min() < LEAST_CURVATURE:
         a, w = np.unravel_index(np.argmin(curvature), curvature.shape)
@@ -103,12 +108,21 @@ theta_i is 23 with a typical radius of curvature R of 42.9 um, and should be abo
             f"{_others(curvature < LEAST_CURVATURE)}."
         )
     if shortest.min() < 1.0:
+        what = "width of features" if rough.facets else "correlation length"
         notes.append(
-            f"The correlation length, {rough.corr_length:.3g} um, is below the wavelength, "
+            f"The {what}, {rough.corr_length:.3g} um, is below the wavelength, "
             f"{waves[np.argmin(shortest)]:g} um: such roughness diffracts"
             f"{_others(shortest < 1.0)}."
         )
-    if not rough.generated and rough.smooth < LEAST_SMOOTH and cell.max() > 0.5:
+    coarse = not rough.generated and rough.smooth < LEAST_SMOOTH and cell.max() > 0.5
+    if coarse and rough.facets:
+        remark = (
+            f"Facets of {rough.cell:.3g} um are wider than half the wavelength, and "
+            f"normals change from one to the next (correlation {rough.smooth:.2g}): they "
+            "are traced as flat faces. Refine the mesh if they stand for a smooth surface."
+        )
+        return Judgement(numbers=numbers, notes=tuple(notes), remarks=(remark,))
+    if coarse:
         notes.append(
             f"Cells of {rough.cell:.3g} um are wider than half the wavelength, "
             f"{waves[np.argmax(cell)]:g} um, and slopes change from cell to cell "

@@ -10,6 +10,8 @@ from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
 
 # Lines of a map that are looked at along each axis, and heights of it that are kept
 LINES, HEIGHTS = 256, 8192
+# A facet that deviates less than this from the mean plane mirrors as the plane does [1]
+FLAT = 1e-4
 # Share of a Gaussian variable within its rms: curvatures of a map are judged by this
 # quantile, which the few edges between flat facets do not move
 WITHIN_RMS = float(special.erf(np.sqrt(0.5)))
@@ -41,6 +43,12 @@ class Roughness:
         Heights about the mean plane, equally likely; empty for a Gaussian. [um]
     generated : bool
         Whether the surface between the nodes is known, as that of a formula is.
+    flat : float
+        Share of the area that is parallel to the mean plane, and mirrors as it does. [1]
+    facets : bool
+        Whether it is a mesh: cells are its facets, and what they stand for is not known.
+    bodies : bool
+        Whether it is bodies without a ground, and so without a mean plane.
     """
 
     height_rms: float
@@ -54,6 +62,9 @@ class Roughness:
     lengths: float
     heights: np.ndarray
     generated: bool
+    flat: float = 0.0
+    facets: bool = False
+    bodies: bool = False
 
     def curvature_radius(self, scale: np.ndarray) -> np.ndarray:
         """Typical radius of curvature over a distance, not below the first step. [um]"""
@@ -148,8 +159,16 @@ def _of_map(surface: HeightMap) -> Roughness:
             one[3] / d for d, one in zip(surface.spacing, found, strict=True)
         )),
         lengths=_fewest(surface.size, [one[3] for one in found]),
-        heights=kept, generated=False,
+        heights=kept, flat=_flat_share(surface), generated=False,
     )  # fmt: skip
+
+
+def _flat_share(surface: HeightMap) -> float:
+    """Share of the cells that are parallel to the mean plane. [1]"""
+    (nx, ny), (along_x, along_y) = surface.cells, surface.slopes()
+    level = np.abs(along_x - np.nanmean(along_x))[:, :ny] <= FLAT
+    level &= np.abs(along_y - np.nanmean(along_y))[:nx] <= FLAT
+    return float(level.mean())
 
 
 def _about_plane(surface: HeightMap) -> np.ndarray:

@@ -98,7 +98,7 @@ def test_wavelengths_under_the_wrong_unit_are_warned_of():
         ("p.csv", "wavelength_nm,n,absorption,delta\n400,1,2,3\n", "line 1: expected known columns, got 'absorption', 'delta'"),
         ("p.csv", "wavelength_nm,n,k [1/cm]\n400,1,2\n", "got 'k .1/cm.'"),
         ("p.csv", "wavelength,n,k\n400,1,2\n500,1,2\n", "column wavelength: expected the unit"),
-        ("p.csv", "wavelength_nm,k\n400,1\n500,1\n", "expected a column n, got none"),
+        ("p.csv", "wavelength_nm,k\n400,1\n500,1\n", "expected n, got kappa only"),
         ("p.csv", "wavelength_nm,n,k,kappa\n400,1,0,0\n", "expected one column of kappa, got k, kappa"),
         ("p.csv", "wavelength_nm,n,k\n400,1.5,0.1\n500,1.5,-0.1\n", "line 3, column k: .*got '-0.1'"),
         ("p.csv", "wavelength_nm,n,k\n400,1.5,0.1\n500,0,0.1\n", "line 3, column n: expected n > 0"),

@@ -168,7 +168,7 @@ def test_emissivity_of_flat_water(wavelength, deep):
         )
 
 
-@pytest.mark.parametrize("wavelength", [3.8, 10.0])
+@pytest.mark.parametrize("wavelength", [3.8, 8.0, 10.0, 12.0])
 def test_emissivity_of_rough_water(wavelength):
     sea = GaussianSurface(shape=(128, 128), spacing=4.0, corr_length=60.0, slope_rms=0.15)
     result = simulate(

@@ -232,13 +232,14 @@ def test_light_through_a_porous_sheet_is_transmitted():
     assert result.albedo.sum().item() + result.transmitted.item() == pytest.approx(1.0)
 
 
+@pytest.mark.filterwarnings("ignore:The tangent plane errs")
 def test_many_wavelengths_take_one_trace():
     waves = np.linspace(0.4, 0.9, 12)
     glass = Material.from_table(wavelength=[0.4, 0.9], n=[1.6, 1.4], kappa=[0.2, 0.0])
     scene = Scene(mushrooms(), glass)
     together = simulate(scene, 0.7, n_rays=6400, wavelength=waves)
     alone = simulate(scene, 0.7, n_rays=6400, wavelength=waves[5])
-    assert "not judged for meshes" in alone.attrs["warnings"][-1]
+    assert any("tangent plane" in note for note in alone.attrs["warnings"])
     assert_allclose(
         together.brdf_total.isel(wavelength=5), alone.brdf_total, rtol=2e-5, atol=1e-9
     )

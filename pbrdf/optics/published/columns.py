@@ -41,6 +41,7 @@ _ROLES = {
     "kappa": {"k", "kappa", "κ", "extinction", "extinction coefficient", "ext coeff",
               "extinction coeff", "ext", "k ext", "im(n)", "imag", "n imag", "im n", "ni",
               "extinction coefficient k"},
+    "diffuse_albedo": {"diffuse albedo", "albedo"},
     "eps1": {"eps1", "e1", "epsilon1", "ε1", "eps real", "re(eps)", "epsilon 1", "eps 1"},
     "eps2": {"eps2", "e2", "epsilon2", "ε2", "eps imag", "im(eps)", "epsilon 2", "eps 2"},
 }  # fmt: skip

@@ -4,18 +4,19 @@ import re
 import warnings
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pbrdf.errors import AccuracyWarning, DataFileError
-from pbrdf.optics.dispersion import Table
+from pbrdf.optics.dispersion import Dispersion, Table
 from pbrdf.optics.materials import Material
 from pbrdf.optics.published.database import read_database_entry
 from pbrdf.optics.published.package import PREFIX, read_by_name
 from pbrdf.optics.published.tables import Block, read_blocks
 from pbrdf.optics.published.text import read_text
 
-__all__ = ["read"]
+__all__ = ["read", "read_constant"]
 
 _SOURCE = re.compile(r"^[#%;!/\s]*source:\s*(.+)$", re.MULTILINE)
 # Beyond the far infrared: more likely nanometres under the name of micrometres [um]
@@ -34,8 +35,8 @@ def read(path: str | Path | Traversable) -> Material:
 
         - a table with names of columns, separated by commas, semicolons, tabs or spaces:
           wavelength_nm, wavelength_um, energy_ev, wavenumber_cm-1 (or the unit in brackets
-          or in a row below); n; kappa, k or extinction; or eps1, eps2. n and k may stand
-          in one table each, as in the export of refractiveindex.info;
+          or in a row below); n; kappa, k or extinction; or eps1, eps2; diffuse_albedo. n
+          and k may stand in one table each, as in the export of refractiveindex.info;
         - a YAML file of the refractiveindex.info database, tables and formulas 1 to 9;
         - an .nk file whose comments name the unit;
         - the text format of ellipsometry programs: a comment, a unit, ``NK``, rows;
@@ -68,33 +69,74 @@ def read(path: str | Path | Traversable) -> Material:
     >>> read(path).index(0.6)
     (1.55, 0.15)
     """
+    found, name, source = _read(path)
+    if "n" not in found:
+        problem = f"expected n, got {', '.join(found)} only"
+        raise DataFileError(name, problem, "Give n beside kappa.")
+    albedo: Any = found.get("diffuse_albedo", 0.0)
+    return Material(
+        found["n"], found.get("kappa", 0.0), albedo, name=_stem(name), source=source
+    )
+
+
+def read_constant(path: str | Path, role: str) -> Dispersion | float:
+    r"""One constant of a file that `read` takes, which may lack the others.
+
+    Parameters
+    ----------
+    path : str or Path
+        As for `read`.
+    role : {"n", "kappa", "diffuse_albedo"}
+        Which; diffuse_albedo is a column of a table.
+
+    Raises
+    ------
+    DataFileError
+        If the file does not hold it, and as `read` does.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> path = Path(tempfile.mkdtemp()) / "base.csv"
+    >>> _ = path.write_text("wavelength_nm,diffuse_albedo\n400,0.2\n800,0.6\n")
+    >>> read_constant(path, "diffuse_albedo")(0.6).round(3)
+    np.float64(0.4)
+    """
+    found, name, _ = _read(path)
+    if role not in found:
+        problem = f"expected {role}, got {', '.join(found)} only"
+        raise DataFileError(name, problem, f"Name a file that holds {role}.")
+    return found[role]
+
+
+def _read(
+    path: str | Path | Traversable,
+) -> tuple[dict[str, Dispersion | float], str | Path, str | None]:
+    """Return all constants of a file by what they are, its name and its source."""
     if str(path).startswith(PREFIX):
         name = str(path).removeprefix(PREFIX)
-        index, extinction, source = read_by_name(name)
-        return Material(index, extinction, name=name, source=source)
+        index, extinction, origin = read_by_name(name)
+        return {"n": index, "kappa": extinction}, str(path), origin
     file = Path(path) if isinstance(path, str) else path
     shown = file if isinstance(file, Path) else Path(file.name)
     text = read_text(file, shown)
+    constants: dict[str, Dispersion | float] = {}
     if shown.suffix.lower() in (".yml", ".yaml"):
-        n, kappa, reference = read_database_entry(shown, text)
-        return Material(n, kappa, name=shown.stem, source=reference)
-    constants: dict[str, Table] = {}
+        entry, reference = read_database_entry(shown, text)
+        constants.update(entry)
+        return constants, shown, reference
     for block in read_blocks(shown, text):
         for name, table in _constants(shown, block).items():
             if name in constants:
                 problem = f"expected one table of {name}, got two"
                 raise DataFileError(shown, problem, "Keep one.", line=block.lines[0])
             constants[name] = table
-    if "n" not in constants:
-        problem = "expected a column n, got none"
-        raise DataFileError(shown, problem, "Give n beside kappa.")
-    found = _SOURCE.search(text)
-    return Material(
-        constants["n"],
-        constants.get("kappa", 0.0),
-        name=shown.stem,
-        source=found[1].strip() if found else None,
-    )
+    origin_line = _SOURCE.search(text)
+    return constants, shown, origin_line[1].strip() if origin_line else None
+
+
+def _stem(name: str | Path) -> str:
+    return name.stem if isinstance(name, Path) else name.removeprefix(PREFIX)
 
 
 def _constants(path: Path, block: Block) -> dict[str, Table]:
@@ -115,7 +157,7 @@ def _constants(path: Path, block: Block) -> dict[str, Table]:
         )
     columns = {
         role: np.asarray(values)[order]
-        for role in ("n", "kappa", "eps1", "eps2")
+        for role in ("n", "kappa", "eps1", "eps2", "diffuse_albedo")
         if (values := block.values(role)) is not None
     }
     if "eps1" in columns:
@@ -124,10 +166,16 @@ def _constants(path: Path, block: Block) -> dict[str, Table]:
             raise DataFileError(path, problem, "Keep one pair.")
         # (n + i kappa)^2 = eps1 + i eps2; the principal root absorbs
         index = np.sqrt(columns.pop("eps1") + 1j * columns.pop("eps2", 0.0))
-        columns = {"n": index.real, "kappa": index.imag}
+        columns |= {"n": index.real, "kappa": index.imag}
     elif "eps2" in columns:
         problem = "expected eps1 beside eps2, got none"
         raise DataFileError(path, problem, "Give both.")
+    for k, value in enumerate(columns.get("diffuse_albedo", ())):
+        if value > 1:
+            problem = f"expected diffuse_albedo in [0, 1], got {value:g}"
+            cure = "It is a fraction; divide percents by 100."
+            line = block.lines[int(order[k])]
+            raise DataFileError(path, problem, cure, line=line, column="diffuse_albedo")
     for k, value in enumerate(columns.get("n", ())):
         if value <= 0:
             problem = f"expected n > 0, got {value:g}"

@@ -21,15 +21,13 @@ _FORMULA = re.compile(r"formula\s+(\d+)")
 _TAG = re.compile(r"<[^<>]*>")
 
 
-def read_database_entry(
-    path: Path, text: str
-) -> tuple[Dispersion, Dispersion | float, str | None]:
-    """Return n, kappa and the source of an entry. Wavelengths in it are micrometres.
+def read_database_entry(path: Path, text: str) -> tuple[dict[str, Dispersion], str | None]:
+    """Return n, kappa by name, and the source of an entry. Wavelengths are micrometres.
 
     Raises
     ------
     DataFileError
-        If it has no index, has one twice, or a table or formula is damaged.
+        If it has a constant twice, or a table or formula is damaged.
     """
     entry = _parse(path, text)
     data = entry.get("DATA")
@@ -43,14 +41,11 @@ def read_database_entry(
                 problem = f"expected {name} once, got it twice"
                 raise DataFileError(path, problem, "Keep one of the tables or formulas.")
             constants[name] = constant
-    if "n" not in constants:
-        problem = "expected a table or formula of n, got kappa only"
-        raise DataFileError(path, problem, "Choose an entry that has n.")
     references = entry.get("REFERENCES")
     source = None
     if isinstance(references, str):
         source = " ".join(_TAG.sub("", references).split())
-    return constants["n"], constants.get("kappa", 0.0), source
+    return constants, source
 
 
 def _parse(path: Path, text: str) -> dict[str, Any]:

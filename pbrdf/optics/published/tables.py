@@ -14,7 +14,8 @@ __all__ = ["Block", "read_blocks"]
 _COMMENT = ("#", "%", ";", "!", "//")
 _CURE = (
     "Known: wavelength_nm, wavelength_um, energy_ev or wavenumber_cm-1; n; kappa, k or "
-    "extinction; eps1, eps2. Remove what is no optical constant, or rename it."
+    "extinction; eps1, eps2; diffuse_albedo. Remove what is no optical constant, or rename "
+    "it."
 )
 # Third line of the text format of ellipsometry programs
 _KINDS = {"nk": ("n", "kappa"), "e1e2": ("eps1", "eps2"), "eps": ("eps1", "eps2"),
@@ -134,7 +135,7 @@ def _columns(path: Path, header: Line, units: Line | None) -> list[Column]:
             problem = f"expected one column of {role}, got {names}"
             cure = "Keep one of them."
             raise DataFileError(path, problem, cure, line=header.number)
-    if "wavelength" not in roles or not set(roles) & {"n", "kappa", "eps1"}:
+    if "wavelength" not in roles or not set(roles) - {"wavelength", "eps2"}:
         names = ", ".join(column.name for column in columns)
         problem = f"expected the columns wavelength_um and n, got {names}"
         cure = "Name them in the first row."
