@@ -225,6 +225,12 @@ class MicrofacetModel:
             If height_rms is known and geometric optics fails at the wavelength. Without
             height_rms that cannot be judged, and nothing is said.
         """
+        if wavelength is not None:
+            # A material of numbers does not look at it
+            require(
+                "wavelength", wavelength, lambda v: (v > 0) & np.isfinite(v),
+                "be positive [um]", "Wavelengths are micrometres.",
+            )  # fmt: skip
         n, kappa = self.material.indices(wavelength)
         if self.height_rms is not None and wavelength is not None:
             for note in self.judge(np.unique(theta_i), np.unique(wavelength)).notes:

@@ -80,7 +80,10 @@ def spectral(name: str, spectrum: Spectrum, wavelength: float | None) -> float:
 
 
 def _tabulated(name: str, table: tuple[Any, Any], wavelength: float) -> float:
-    waves, values = (np.asarray(one, dtype=np.float64) for one in table)
+    waves, values = (
+        require(f"{name} table", one, np.isfinite, "be finite", "Leave gaps out.")
+        for one in table
+    )
     if waves.ndim != 1 or waves.shape != values.shape or (np.diff(waves) <= 0).any():
         msg = (
             f"{name} must be (wavelengths, values) of one length with rising wavelengths, "

@@ -126,7 +126,12 @@ class SkyTable:
         values = require(
             "values", self.values, np.isfinite, "be finite", "Fill the gaps of the table."
         )
-        waves = None if self.wavelength is None else np.asarray(self.wavelength, float)
+        waves = None
+        if self.wavelength is not None:
+            waves = require(
+                "wavelength", self.wavelength, lambda v: (v > 0) & np.isfinite(v),
+                "be positive [um]", "Wavelengths are micrometres.",
+            )  # fmt: skip
         wanted: tuple[int, ...] = (theta.size, phi.size, 4)
         wanted = wanted if waves is None else (waves.size, *wanted)
         if values.shape != wanted:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from pbrdf.errors import require
 from pbrdf.validity.limits import Judgement
 
 # Size parameter 2 π R / λ from which reflection and refraction hold to 1 %
@@ -46,7 +47,12 @@ def judge_contaminants(
     three coherence lengths of 2 n d, if light comes back from under it: `film_field` is the
     field that does, exp(-4πκd/λ), and 0 in a film thick enough.
     """
-    waves = np.atleast_1d(np.asarray(wavelength, dtype=np.float64))
+    waves = np.atleast_1d(
+        require(
+            "wavelength", wavelength, lambda v: (v > 0) & np.isfinite(v),
+            "be positive [um]", "Wavelengths are micrometres.",
+        )
+    )  # fmt: skip
     numbers: dict[str, np.ndarray] = {}
     notes = []
     for number, report in enumerate(reports):

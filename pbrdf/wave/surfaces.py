@@ -187,14 +187,19 @@ def heights_of(
     return known[autocorrelation](height_rms, corr_length)
 
 
-def _columns(name: str, pair: Any) -> tuple[Array, Array]:
+def _columns(name: str, pair: Any, parts: tuple[str, str]) -> tuple[Array, Array]:
     """Two rising columns of a table."""
     try:
         first, second = pair
-        x, y = np.array(first, dtype=np.float64), np.array(second, dtype=np.float64)
     except (TypeError, ValueError) as error:
         msg = f"{name} must be two columns of numbers, got {type(pair).__name__}."
         raise TypeError(msg) from error
+    x, y = (
+        np.array(
+            require(f"{name} {part}", one, np.isfinite, "be finite", "Leave gaps out.")
+        )
+        for part, one in zip(parts, (first, second), strict=True)
+    )
     if x.ndim != 1 or x.shape != y.shape or x.size < 4:
         msg = (
             f"{name} must be two columns of one length of at least 4, got shapes "
@@ -214,7 +219,7 @@ def _from_density(
     if corr_length is not None:
         msg = f"corr_length must be left out with a psd, which has it, got {corr_length:g}."
         raise ValueError(msg)
-    frequency, density = _columns("psd", psd)
+    frequency, density = _columns("psd", psd, ("frequency", "density"))
     if frequency[0] == 0.0:
         frequency, density = frequency[1:], density[1:]
     require("psd frequency", frequency, lambda v: v > 0, "be positive [1/um]", "")
@@ -252,7 +257,7 @@ def _from_correlation(rho: Any, height_rms: float, corr_length: float | None) ->
             )
             raise ValueError(msg)
         return FromCorrelation(height_rms, length, rho, farthest)
-    lag, values = _columns("autocorrelation", rho)
+    lag, values = _columns("autocorrelation", rho, ("lag", "value"))
     values_ok = require(
         "autocorrelation", values, lambda v: np.abs(v) <= 1 + 1e-9, "lie in [-1, 1] [1]",
         "It is the correlation, not the covariance.",

@@ -97,7 +97,7 @@ def test_a_file_of_constants_may_hold_the_albedo_of_the_base(tmp_path):
     ("constant", "message"),
     [
         ('{ file = "n.csv" }', "n.csv: expected kappa, got n only"),
-        ('{ file = "absent.csv" }', "absent.csv: expected a file"),
+        ('{ file = "absent.csv" }', "absent.csv: cannot be read"),
         ("{ file = 7 }", r"\[substrate\] kappa: 'file' must be a path, got 7"),
         ('{ file = "../n.csv" }', r"\[substrate\] kappa: file .* outside the folder"),
         ('{ file = "n.csv", unit = "nm" }', "or file, or|or file, got 'file', 'unit'"),

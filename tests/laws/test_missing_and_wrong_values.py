@@ -11,11 +11,21 @@ import fitting
 import pbrdf
 from data_io import Profile
 from fitting import surface_statistics
-from pbrdf import GaussianSurface, HeightMap, Material, MicrofacetModel, Scene, simulate
+from pbrdf import (
+    GaussianSurface,
+    HeightMap,
+    Material,
+    MeshSurface,
+    MicrofacetModel,
+    Scene,
+    WaveModel,
+    simulate,
+)
 from pbrdf.analytic import SlopeTable
 from pbrdf.contaminants import Drops, Spheres
 from pbrdf.conventions import direction, meridian_frame
 from pbrdf.optics import convert_brdf, dolp, specular_mueller
+from pbrdf.validity import judge_contaminants
 
 SCENE = Scene(HeightMap.flat(), Material(1.5, 0.2))
 MODEL = MicrofacetModel(Material(1.5), slope_rms=0.2)
@@ -95,6 +105,55 @@ def test_masked_directions_stay_missing():
     assert np.isnan(direction(hidden([0.3, 0.4], 1), 0.2)[1]).all()
     assert np.isnan(meridian_frame(np.ma.masked_equal([0.6, 0.0, 0.8], 0.6))[0]).any()
     assert np.isnan(dolp(hidden([1.0, 0.3, 0.0, 0.0], 1)))
+
+
+def pyramid(**hidden_at):
+    """Four faces over a square, with masks at places of their arrays."""
+    corners = np.array([(0, 0, 0), (6, 0, 0), (6, 4, 0), (0, 4, 0), (3, 2, 1.5)])
+    arrays = {
+        "vertices": np.ma.array(corners, dtype=float),
+        "faces": np.ma.array([(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]),
+    }
+    for name, place in hidden_at.items():
+        arrays[name][place] = np.ma.masked
+    return arrays["vertices"], arrays["faces"]
+
+
+def test_masks_of_a_mesh_are_honoured():
+    """The apex would be traced at the height under its mask."""
+    assert len(MeshSurface(pyramid(), period=(6, 4)).faces) == 4
+    with pytest.raises(ValueError, match="vertices must be finite"):
+        MeshSurface(pyramid(vertices=(4, 2)), period=(6, 4))
+    with pytest.raises(ValueError, match="faces must be whole numbers, got a masked"):
+        MeshSurface(pyramid(faces=(1, 1)), period=(6, 4))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.ma.array([0.5, ARTEFACT], mask=[False, True]),
+        np.array([0.5, -1.0]),
+        0.5 + 1j,
+        True,
+    ],
+    ids=["masked", "negative", "complex", "truth value"],
+)
+def test_wavelengths_are_checked_where_nothing_depends_on_them(wrong):  # fmt: skip
+    for call in (
+        lambda: MODEL.brdf(0.3, 0.2, 3.0, wavelength=wrong),
+        lambda: judge_contaminants([{"kind": "film", "thickness": 1.0}], wrong),
+    ):
+        with pytest.raises((TypeError, ValueError), match="wavelength must be"):
+            call()
+
+
+@pytest.mark.parametrize("column", ["frequency", "density"])
+def test_masked_spectra_are_refused(column):
+    table = {"frequency": [0.01, 0.02, 0.04, 0.08], "density": [9.0, 4.0, 1.0, 0.1]}
+    WaveModel(Material(1.5), psd=tuple(table.values()))
+    table[column] = hidden(table[column], 2)
+    with pytest.raises(ValueError, match=f"psd {column} must be finite, got a masked"):
+        WaveModel(Material(1.5), psd=tuple(table.values())).brdf(0.3, 0.2, 3.0, 0.5)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pbrdf.errors import DataFileError
+from pbrdf.errors import DataFileError, real_array
 
 FORMATS = (".stl", ".ply", ".obj", ".glb", ".gltf", ".off")
 # Arrays `vertices`, `faces` and perhaps `labels`, in float64
@@ -111,8 +111,15 @@ def raw_mesh(mesh: Any) -> Raw:
     if isinstance(mesh, str | Path):
         return read_mesh_file(Path(mesh))
     if isinstance(mesh, tuple) and len(mesh) == 2:
-        faces = np.asarray(mesh[1])
-        return Raw(np.asarray(mesh[0]), faces, np.zeros(len(faces), int), None)
+        vertices, faces = mesh
+        if np.ma.is_masked(faces):
+            msg = "faces must be whole numbers, got a masked value. Leave out those faces."
+            raise ValueError(msg)
+        if np.ma.is_masked(vertices):
+            # Missing; what no face uses may be so
+            vertices = real_array("vertices", vertices)
+        faces = np.asarray(faces)
+        return Raw(np.asarray(vertices), faces, np.zeros(len(faces), int), None)
     raw = _raw_of(mesh)
     if raw is None:
         msg = (
