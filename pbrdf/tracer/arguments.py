@@ -220,9 +220,9 @@ def judge_surface(scene: Scene, angles: np.ndarray, waves: np.ndarray | None) ->
     if waves is None:
         return Judgement()
     surface = scene.surface
-    mesh = isinstance(surface, MeshSurface)
-    rough = roughness_of_mesh(surface) if mesh else roughness_of(surface)
-    return judge(rough, angles, waves)
+    if isinstance(surface, MeshSurface):
+        return judge(roughness_of_mesh(surface), angles, waves)
+    return judge(roughness_of(surface), angles, waves)
 
 
 def varies(scene: Scene) -> bool:
