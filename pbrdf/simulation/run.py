@@ -30,7 +30,12 @@ from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.schedule import gather
 from pbrdf.tracer.thin_films import thin_absorber_warnings
-from pbrdf.tracer.wet_field import WetField, contaminant_materials, media_of
+from pbrdf.tracer.wet_field import (
+    WetField,
+    contaminant_materials,
+    media_of,
+    opaque_drop_notes,
+)
 from pbrdf.validity import (
     Judgement,
     attach,
@@ -225,6 +230,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
     # What rays do not see at these wavelengths is no fault where waves do the first bounce
     judged = arguments.judge_surface(scene, angles, None if wave else waves)
     notes = [*arguments.scene_warnings(scene, drawn), *judged.notes]
+    notes += opaque_drop_notes(scene.contaminants, waves)
     for note in notes:
         warnings.warn(note, AccuracyWarning, stacklevel=2)
 

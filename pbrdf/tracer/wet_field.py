@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pbrdf.contaminants.bodies import Bodies, Placement, place
+from pbrdf.contaminants.drops import Drops
 from pbrdf.kernels.bodies import bodies as bodies_kernel
 from pbrdf.kernels.bodies import events
 from pbrdf.kernels.bodies.media import DEEP
@@ -147,6 +148,27 @@ def media_of(
     return events.Media(
         n, kappa, absorption, solid, solid_n, solid_kappa, black, base, tail
     )
+
+
+def opaque_drop_notes(contaminants: Sequence[Any], waves: np.ndarray | None) -> list[str]:
+    """Say which drops are taken as opaque for want of a wavelength, flat as they are.
+
+    A body as wide as `OPAQUE_KAPPA` takes it for lets no light through; a cap is thinner
+    by 1 - cos of its contact angle.
+    """
+    notes = []
+    for one in contaminants if waves is None else ():
+        if not isinstance(one, Drops) or one.material.has_base:
+            continue
+        kappa = one.material.index()[1]
+        thinness = 1.0 - np.cos(min(one.contact_angle, np.pi / 2))
+        if kappa >= OPAQUE_KAPPA > kappa * thinness:
+            notes.append(
+                f"Drops of contact angle {np.rad2deg(one.contact_angle):.3g} deg and kappa "
+                f"{kappa:.3g} are taken as opaque for want of a wavelength, but are so flat "
+                "that light may cross them. Pass wavelength."
+            )
+    return notes
 
 
 def _check_transparent(kappa: np.ndarray) -> None:

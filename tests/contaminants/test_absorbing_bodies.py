@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pbrdf import (
+    AccuracyWarning,
     Drops,
     Film,
     GaussianSurface,
@@ -143,6 +144,24 @@ def test_cap_of_the_issue():
     """Of 15 degrees and 5 um height: light passes, where all of kappa 0.01 was opaque."""
     albedo, _ = swept(CASES["cap"], [0.0099, 0.0101], 20_000)
     assert ((albedo > 0.76) & (albedo < 0.79)).all()
+
+
+def test_flat_drops_without_a_wavelength_are_warned_of():
+    """A cap of 15 degrees and kappa 0.05 lets light through; a hemisphere does not."""
+
+    def run(angle, **options):
+        drop = Drops.at(
+            [[50.0, 50.0]], volume=9e3, contact_angle=angle, material=Material(1.333, 0.05)
+        )
+        return simulate(Scene(FLAT, Material.mirror(), drop), 0.5, n_rays=320, **options)
+
+    with pytest.warns(AccuracyWarning, match=r"15 deg and kappa 0.05 are taken as opaque"):
+        flat = run(np.deg2rad(15.0))
+    assert any("Pass wavelength" in note for note in flat.attrs["warnings"])
+    assert run(np.deg2rad(85.0)).attrs["warnings"] == []
+    known = run(np.deg2rad(15.0), wavelength=1.0)
+    assert not any("Pass wavelength" in note for note in known.attrs["warnings"])
+    assert known.albedo.sum() > flat.albedo.sum() + 0.01
 
 
 # Fresnel, unpolarised, from the constants of the library
