@@ -164,9 +164,9 @@ def opaque_drop_notes(contaminants: Sequence[Any], waves: np.ndarray | None) -> 
         thinness = 1.0 - np.cos(min(one.contact_angle, np.pi / 2))
         if kappa >= OPAQUE_KAPPA > kappa * thinness:
             notes.append(
-                f"Drops of contact angle {np.rad2deg(one.contact_angle):.3g} deg and kappa "
-                f"{kappa:.3g} are taken as opaque for want of a wavelength, but are so flat "
-                "that light may cross them. Pass wavelength."
+                f"Drops of contact angle {np.rad2deg(one.contact_angle):.3g} deg and "
+                f"kappa {kappa:.3g} are taken as opaque for want of a wavelength, but are "
+                "so flat that light may cross them. Pass wavelength."
             )
     return notes
 
