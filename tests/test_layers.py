@@ -172,3 +172,45 @@ def test_no_module_is_named_like_a_function_in_it() -> None:
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == path.stem
     ]
     assert not hidden
+
+
+# Lines of a function from behind its docstring on: signature and docstring may be long
+MOST_LINES, MOST_KERNEL_LINES, MOST_KERNEL_ARGUMENTS = 60, 90, 14
+
+
+def functions() -> list[tuple[str, bool, ast.FunctionDef]]:
+    """Every function by place, and whether it is a kernel."""
+    return [
+        (f"{path.relative_to(ROOT)}:{node.name}", "kernels" in path.parts, node)
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.FunctionDef)
+    ]
+
+
+def lines_of_body(function: ast.FunctionDef) -> int:
+    told = ast.get_docstring(function, clean=False) is not None
+    body = function.body[1:] if told else function.body
+    return (function.end_lineno or 0) - body[0].lineno + 1 if body else 0
+
+
+def test_functions_stay_short() -> None:
+    """A longer kernel says in its docstring why it is one function on purpose."""
+    long = {}
+    for place, is_kernel, function in functions():
+        most = MOST_KERNEL_LINES if is_kernel else MOST_LINES
+        excused = is_kernel and "one function on purpose" in " ".join(
+            (ast.get_docstring(function) or "").split()
+        )
+        if lines_of_body(function) > most and not excused:
+            long[place] = lines_of_body(function)
+    assert not long
+
+
+def test_kernels_take_few_arguments() -> None:
+    crowded = {
+        place: len(function.args.args)
+        for place, is_kernel, function in functions()
+        if is_kernel and len(function.args.args) > MOST_KERNEL_ARGUMENTS
+    }
+    assert not crowded

@@ -141,21 +141,11 @@ def fit_laplace(points: np.ndarray, start: np.ndarray | None = None) -> ShapeFit
         diff_step=1e-4,
     )
     p = found.x - shift
-
-    def at(parameters: np.ndarray, height: float = 0.0) -> tuple[float, float]:
-        depth = (parameters[1] - height) / parameters[2]
-        low, share = _grid_place(parameters[3])
-        ends = [
-            [np.interp(depth, z, column) for column in (angle, x)]
-            for x, z, angle in (laplace_profile(b).T for b in (low, round(low + GRID, 9)))
-        ]
-        angle, x = (1 - share) * np.array(ends[0]) + share * np.array(ends[1])
-        return float(angle), float(parameters[0] + parameters[2] * x)
-
     rest = residual(p)
     covariance, variance = _covariance(found.jac, rest)
     free = p - covariance @ found.grad / variance
     middle, covariance = _within_bond_numbers(free, covariance)
+    at = _laplace_at
     # Near 180 degrees a hundredth of a Bond number is degrees
     steps = np.array([1e-3, 0.02, 1e-4 * p[2], GRID / 4])
     gradient = np.array(
@@ -176,6 +166,18 @@ def fit_laplace(points: np.ndarray, start: np.ndarray | None = None) -> ShapeFit
         bond_number=float(p[3]),
         parameters=p,
     )
+
+
+def _laplace_at(parameters: np.ndarray, height: float = 0.0) -> tuple[float, float]:
+    """Return angle and outward place of a drop at a height above its base."""
+    depth = (parameters[1] - height) / parameters[2]
+    low, share = _grid_place(parameters[3])
+    ends = [
+        [np.interp(depth, z, column) for column in (angle, x)]
+        for x, z, angle in (laplace_profile(b).T for b in (low, round(low + GRID, 9)))
+    ]
+    angle, x = (1 - share) * np.array(ends[0]) + share * np.array(ends[1])
+    return float(angle), float(parameters[0] + parameters[2] * x)
 
 
 def _within_bond_numbers(

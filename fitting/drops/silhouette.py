@@ -245,19 +245,7 @@ def _fit_sides(
     ]
     check_shape(name, clear, whole, [(fit, other) for fit, other, _ in results])
     remarks = list(remarks)
-    estimates = []
     for name, (fit, other, _) in zip(("left", "right"), results, strict=True):
-        error = np.sqrt(
-            fit.stderr**2
-            + _model_variance(fit, other)
-            + (fit.slope_by_height * drop.offset_stderr) ** 2
-            + drop.lean_stderr**2
-        )
-        degrees = float(np.rad2deg(fit.angle))
-        ends = [np.rad2deg(fit.centre + d * error) for d in (-1.96, 1.96)]
-        low, high = np.clip([min(ends[0], degrees), max(ends[1], degrees)], 0, 180)
-        stderr = float(np.rad2deg(np.hypot(error, fit.centre - fit.angle)))
-        estimates.append(Estimate(degrees, stderr, float(low), float(high)))
         if abs(fit.angle - other.angle) > np.deg2rad(3):
             remarks.append(
                 f"Young-Laplace fit and local arc differ on the {name} by "
@@ -268,28 +256,11 @@ def _fit_sides(
         remarks.append(
             "the contour is no axisymmetric drop under gravity (pinned, moving or uneven)"
         )
-    cos, sin = np.cos(drop.lean), np.sin(drop.lean)
-    middle = drop.baseline.mean(axis=0)
-    start = drop.baseline[0] + origin
-    along = drop.points[:, 0] - drop.points[0, 0]
-    contour = np.stack(
-        [
-            start[0] - along * sin - drop.points[:, 1] * cos,
-            start[1] + along * cos - drop.points[:, 1] * sin,
-        ],
-        axis=1,
-    )
     left, right = -results[0][0].contact, results[1][0].contact
-    mid_along = (drop.points[0, 0] + drop.points[-1, 0]) / 2
-    contacts = np.array(
-        [
-            [middle[0] - (a - mid_along) * sin, middle[1] + (a - mid_along) * cos]
-            for a in (left, right)
-        ]
-    )
+    contour, contacts = _in_picture(drop, (left, right))
     return ContactAngle(
-        left=estimates[0],
-        right=estimates[1],
+        left=_estimate(drop, *results[0][:2]),
+        right=_estimate(drop, *results[1][:2]),
         baseline=contacts + origin,
         lean=float(np.rad2deg(drop.lean)),
         base_width=float(right - left),
@@ -298,13 +269,53 @@ def _fit_sides(
         model=(models[0], models[1]),
         rms=(results[0][0].rms, results[1][0].rms),
         blur=drop.blur,
-        contour=contour,
+        contour=contour + origin,
         per_pixel=(
             -float(np.rad2deg(results[0][0].slope_by_height)),
             -float(np.rad2deg(results[1][0].slope_by_height)),
         ),
         warnings=tuple(remarks),
     )
+
+
+def _estimate(drop: DropContour, fit: ShapeFit, other: ShapeFit) -> Estimate:
+    """Return the angle of one side, whose other model tells what the choice of it adds."""
+    error = np.sqrt(
+        fit.stderr**2
+        + _model_variance(fit, other)
+        + (fit.slope_by_height * drop.offset_stderr) ** 2
+        + drop.lean_stderr**2
+    )
+    degrees = float(np.rad2deg(fit.angle))
+    ends = [np.rad2deg(fit.centre + d * error) for d in (-1.96, 1.96)]
+    low, high = np.clip([min(ends[0], degrees), max(ends[1], degrees)], 0, 180)
+    stderr = float(np.rad2deg(np.hypot(error, fit.centre - fit.angle)))
+    return Estimate(degrees, stderr, float(low), float(high))
+
+
+def _in_picture(
+    drop: DropContour, contacts: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return contour and contact points in rows and columns of what was cut out."""
+    cos, sin = np.cos(drop.lean), np.sin(drop.lean)
+    middle = drop.baseline.mean(axis=0)
+    start = drop.baseline[0]
+    along = drop.points[:, 0] - drop.points[0, 0]
+    contour = np.stack(
+        [
+            start[0] - along * sin - drop.points[:, 1] * cos,
+            start[1] + along * cos - drop.points[:, 1] * sin,
+        ],
+        axis=1,
+    )
+    mid_along = (drop.points[0, 0] + drop.points[-1, 0]) / 2
+    ends = np.array(
+        [
+            [middle[0] - (a - mid_along) * sin, middle[1] + (a - mid_along) * cos]
+            for a in contacts
+        ]
+    )
+    return contour, ends
 
 
 def _clear_of_corners(drop: DropContour) -> np.ndarray:

@@ -1,6 +1,7 @@
 """From a map to a prediction: mend, find the patches, and spread what is not known."""
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -129,8 +130,6 @@ def predict(
         )
         warnings.warn(text, UserWarning, stacklevel=2)
         notes.append(text)
-    rng = np.random.default_rng(seed)
-    ensemble = []
     # Three sizes of patches carry the prior; slopes are scaled within them
     sizes = [
         facets_of(
@@ -138,10 +137,26 @@ def predict(
         )
         for z in np.sqrt(1.5) * np.array([-1.0, 0.0, 1.0])
     ]
+    draws = _ensemble(
+        sizes, optics, seed, place=place, index_stderr=index_stderr, base_albedo=base_albedo
+    )
+    return Prediction(
+        model=_model(facets, optics), wavelength=float(wavelength), facets=facets,
+        draws=draws, notes=tuple(notes),
+    )  # fmt: skip
+
+
+def _ensemble(
+    sizes: Sequence[Facets], optics: Material, seed: int, *, place: float,
+    index_stderr: float, base_albedo: float,
+) -> tuple[Draw, ...]:  # fmt: skip
+    """Draw models from all that is not known, over each size of patches in turn."""
+    rng = np.random.default_rng(seed)
+    draws = []
     for i in range(_DRAWS):
         scale = float(np.exp(place * rng.standard_normal()))
         shift = float(index_stderr * rng.standard_normal())
-        ensemble.append(
+        draws.append(
             Draw(
                 model=_model(
                     sizes[i % 3], _shifted(optics, shift), scale=scale, nodes=_NODES
@@ -150,10 +165,7 @@ def predict(
                 base=base_albedo * rng.random(_WITHIN),
             )
         )
-    return Prediction(
-        model=_model(facets, optics), wavelength=float(wavelength), facets=facets,
-        draws=tuple(ensemble), notes=tuple(notes),
-    )  # fmt: skip
+    return tuple(draws)
 
 
 def _mended(surface: HeightMap) -> HeightMap:

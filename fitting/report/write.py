@@ -169,7 +169,31 @@ def _sections(
             figures["surface.png"], "Heights and slopes, and Gaussians of their rms."
         ),
     )
+    yield _model_section(fits, figures["scan.png"])
     yield html.section(
+        "Hemisphere",
+        html.paragraph("The simulation, for a specular gain of 1 and no diffuse part."),
+        hemisphere_view(result.simulation),
+    )
+    yield html.section("What these data cannot tell", html.bullets(result.unknown))
+    yield html.section(
+        "Simulation",
+        html.table(
+            ("", ""), [(name, str(result.simulation.attrs[name])) for name in _SHOWN]
+        ),
+    )
+    yield html.section(
+        "Time",
+        html.table(
+            ("stage", "seconds"),
+            [(stage, f"{elapsed:.1f}") for stage, elapsed in seconds.items()],
+        ),
+    )
+
+
+def _model_section(fits: "dict[str, FitResult]", scan: bytes) -> str:
+    """Return the section of the fits, with the figure of the scan."""
+    return html.section(
         "Model",
         html.table(("parameter", *fits), _estimate_rows(fits)),
         html.paragraph(
@@ -192,29 +216,10 @@ def _sections(
             for title, fit in fits.items()
         ),
         html.figure(
-            figures["scan.png"],
+            scan,
             "Scan, analytical curve (dashed) and Monte Carlo with all bounces (full, band: "
             "95 %). Below: what the scan shows beyond each curve, in standard errors where "
             "the scan gives errors; grey: two of them.",
-        ),
-    )
-    yield html.section(
-        "Hemisphere",
-        html.paragraph("The simulation, for a specular gain of 1 and no diffuse part."),
-        hemisphere_view(result.simulation),
-    )
-    yield html.section("What these data cannot tell", html.bullets(result.unknown))
-    yield html.section(
-        "Simulation",
-        html.table(
-            ("", ""), [(name, str(result.simulation.attrs[name])) for name in _SHOWN]
-        ),
-    )
-    yield html.section(
-        "Time",
-        html.table(
-            ("stage", "seconds"),
-            [(stage, f"{elapsed:.1f}") for stage, elapsed in seconds.items()],
         ),
     )
 

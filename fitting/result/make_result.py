@@ -67,11 +67,8 @@ def result_of(
             covariance = _unanchored(problem, covariance)
             parts |= {labels[i]: {"noise": np.inf} for i in _lost(problem)}
             found = replace(found, covariance=_unanchored(problem, found.covariance))
-        p_value = np.nan
-        if problem.weights.n_estimated == 0 and dof > 0:
-            p_value = float(stats.chi2.sf(chi2, dof))
         warnings += identifiability_warnings(problem, solved, found)
-        warnings += misfit_warnings(problem, solved, p_value)
+        warnings += misfit_warnings(problem, solved, _p_value(problem, chi2, dof))
         warnings += cone_warnings(problem, solved)
 
     values = dict(zip(labels, solution.x.tolist(), strict=True))
@@ -101,6 +98,13 @@ def result_of(
         anchored_stderr=anchored_stderr,
         problem=replace(problem, objective=objective),
     )
+
+
+def _p_value(problem: Problem, chi2: float, dof: int) -> float:
+    """Return the chance of a chi2 as large, NaN where the noise is estimated from it."""
+    if problem.weights.n_estimated > 0 or dof <= 0:
+        return np.nan
+    return float(stats.chi2.sf(chi2, dof))
 
 
 def _lost(problem: Problem) -> list[int]:

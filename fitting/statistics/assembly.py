@@ -67,20 +67,16 @@ def assemble(
     height = height_rms(fits, step)
     slope = _combine([axis.slope_rms for axis in axes], 2)
     counts = _independent(axes)
-    sampling_slope = np.sqrt(
-        np.mean(
-            [a.fit.increments.mean_square[0] / a.fit.increments.lags[0] ** 2 for a in axes]
-        )
-    )
+    steps = [a.fit.increments for a in axes]
+    sampling_slope = np.sqrt(np.mean([s.mean_square[0] / s.lags[0] ** 2 for s in steps]))
     noise = _noise_rms(fits)
     known = int(np.isfinite(residual).sum())
     anisotropy = None
     if kind == "map":
+        finest = min(a.corr_length.value for a in axes) / 5
+        variance = noise.value**2 + step**2 / 12
         anisotropy = measure_anisotropy(
-            residual,
-            (spacing[0], spacing[1]),
-            min(a.corr_length.value for a in axes) / 5,
-            noise.value**2 + step**2 / 12,
+            residual, (spacing[0], spacing[1]), finest, variance
         )
     findings = Findings(
         kind=kind,

@@ -9,9 +9,11 @@ from typing import Annotated, Any
 import typer
 
 __all__ = [
+    "Azimuth",
     "Azimuths",
     "Block",
     "Blocked",
+    "Bundles",
     "Channel",
     "ColumnsOption",
     "Fold",
@@ -206,6 +208,14 @@ PlannedRealizations = Annotated[
         help="Independent random surfaces: 16, or planned for a target error.",
     ),
 ]  # fmt: skip
+Bundles = Annotated[
+    int,
+    typer.Option(
+        "--n-rays", min=1000, max=10**9,
+        help="Rays a geometry and realisation: fewer than simulate's, for each looks for "
+        "one source, not for every direction.",
+    ),
+]  # fmt: skip
 Seed = Annotated[int, typer.Option(min=0, help="Makes the run reproducible, bit for bit.")]
 Workers = Annotated[
     int | None, typer.Option(min=1, max=1024, help="Threads; all cores if not given.")
@@ -217,6 +227,14 @@ Azimuths = Annotated[
     str,
     typer.Option(
         "--phi-i-deg", help="Azimuths of the source by commas, or uniform for the average."
+    ),
+]
+Azimuth = Annotated[
+    str,
+    typer.Option(
+        "--phi-i-deg",
+        help="Azimuth of the source, or uniform for the average, which is what a scan "
+        "compares with unless the sample was aligned.",
     ),
 ]
 SourceHalfAngle = Annotated[

@@ -1,5 +1,6 @@
 """Bundles of rays over one surface sample, from one end of the scan to the other."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from pbrdf.kernels.cones.lens import cap_flux, lens_flux
 from pbrdf.kernels.cones.paths import FAR_END, Bundle, Rule
 from pbrdf.kernels.cones.record import ALL, FORETOLD, GLINTS, N_AXES, Catch
 from pbrdf.kernels.paths import shading
-from pbrdf.observation.look import Sums, forward
+from pbrdf.observation.look import Look, Sums, forward
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.mesh_field import MeshField
 
@@ -27,21 +28,12 @@ def send_bundles(
 ) -> None:  # fmt: skip
     """Send bundles from each distinct direction of one end to all cones of the other."""
     look = sample.look
-    here, there = look.theta_s, look.theta_i
-    half_here, half_there = look.detector, look.source
-    turn = -look.dphi
-    omega_i, omega_s = look.solid_angles()
-    omega_there = omega_i
-    if from_source:
-        here, there = there, here
-        half_here, half_there = half_there, half_here
-        turn = look.dphi
-        omega_there = omega_s
+    trip = _Trip.of(look, from_source=from_source)
     phi = np.zeros(look.size)
     if look.phi_i is not None:
         phi = look.phi_i + (np.zeros(look.size) if from_source else look.dphi)
     starts, member = np.unique(
-        np.round(np.stack([here, phi], axis=1), 12), axis=0, return_inverse=True
+        np.round(np.stack([trip.here, phi], axis=1), 12), axis=0, return_inverse=True
     )
     member = member.reshape(-1)
 
@@ -50,28 +42,21 @@ def send_bundles(
         kind, first, look.counts, float(look.hemisphere_samples), float(look.sample_decay),
         cos_spread, np.sqrt(1.0 - cos_spread**2),
     )  # fmt: skip
-    reach, chance = near_misses(half_here, half_there, counting=look.counts)
+    reach, chance = near_misses(trip.half_here, trip.half_there, counting=look.counts)
     record = np.empty((look.max_bounces + 1, 1, shading.N_RECORD))
     hits = np.empty((look.max_bounces, observe_paths.N_HIT))
     shape = look.shape[1:]
     for start, (theta, azimuth) in enumerate(starts):
         group = np.flatnonzero(member == start)
-        targets = np.stack(
-            [
-                np.sin(there[group]), np.cos(there[group]), np.cos(turn[group]),
-                np.sin(turn[group]), np.full(len(group), np.cos(half_there)),
-                np.full(len(group), np.sin(half_there)), np.full(len(group), np.cos(reach)),
-                np.full(len(group), chance),
-            ],
-            axis=1,
-        )  # fmt: skip
+        targets = trip.targets(group, reach, chance)
         launch = surface.entry_rectangle(
-            theta, None if look.phi_i is None else azimuth, half_here
+            theta, None if look.phi_i is None else azimuth, trip.half_here
         )
         bundle = Bundle(
-            np.sin(theta), np.cos(theta), azimuth, look.phi_i is None, np.cos(half_here),
-            np.sin(half_here), launch, surface.entry_lines(launch, look.n_rays),
-            look.n_rays, rng.random(5), rng.integers(2**63, dtype=np.uint64),
+            np.sin(theta), np.cos(theta), azimuth, look.phi_i is None,
+            np.cos(trip.half_here), np.sin(trip.half_here), launch,
+            surface.entry_lines(launch, look.n_rays), look.n_rays, rng.random(5),
+            rng.integers(2**63, dtype=np.uint64),
         )  # fmt: skip
         catch = Catch(
             np.zeros((3, len(group), *shape)),
@@ -92,23 +77,68 @@ def send_bundles(
                 "rays, a larger map or HeightMap.mirrored()."
             )
             raise ValueError(msg)
-        scale = 1.0 / ((look.n_rays - aside) * omega_there[group])
-        flux = catch.flux * scale[:, None, None, None, None]
-        foretold = flux[FORETOLD] * scale[:, None, None, None, None]
-        sample.brdf[group] += flux[ALL] if from_source else forward(flux[ALL])
-        sample.glints[group] += flux[GLINTS] if from_source else forward(flux[GLINTS])
-        sample.foretold[group] += foretold if from_source else foretold.swapaxes(-1, -2)
-        sample.caught[group] += catch.caught[ALL]
-        sample.glints_caught[group] += catch.caught[GLINTS]
-        # A bundle weighs at most as the smaller of the two cones
-        weight = np.minimum(1.0, (np.sin(half_there) / np.sin(half_here)) ** 2)
-        sample.one[group] = np.maximum(sample.one[group], (weight * scale)[:, None])
+        trip.add(catch, group, look.n_rays - aside, sample)
         if kind != FAR_END:
             # The far end follows only some paths; the others hold all the energy
             sample.energy += catch.energy
             sample.valued += look.n_rays
         sample.counts += catch.counts
         sample.bundles += look.n_rays
+
+
+@dataclass(frozen=True)
+class _Trip:
+    """Zeniths and half-angles of the ends where bundles start and arrive [rad].
+
+    `turn` is the azimuth of the far end from the near one, `omega_there` the projected
+    solid angle of the far end. [sr]
+    """
+
+    here: np.ndarray
+    there: np.ndarray
+    half_here: float
+    half_there: float
+    turn: np.ndarray
+    omega_there: np.ndarray
+    from_source: bool
+
+    @classmethod
+    def of(cls, look: Look, *, from_source: bool) -> "_Trip":
+        """Return the way from the detector to the source, or the other."""
+        omega_i, omega_s = look.solid_angles()
+        source, detector = (look.theta_i, look.source), (look.theta_s, look.detector)
+        near, far = (source, detector) if from_source else (detector, source)
+        return cls(
+            here=near[0], there=far[0], half_here=near[1], half_there=far[1],
+            turn=look.dphi if from_source else -look.dphi,
+            omega_there=omega_s if from_source else omega_i, from_source=from_source,
+        )  # fmt: skip
+
+    def targets(self, group: np.ndarray, reach: float, chance: float) -> np.ndarray:
+        """Return the cones at the far end, (targets, N_TARGET)."""
+        there, turn = self.there[group], self.turn[group]
+        same = [np.cos(self.half_there), np.sin(self.half_there), np.cos(reach), chance]
+        return np.column_stack(
+            [
+                np.sin(there), np.cos(there), np.cos(turn), np.sin(turn),
+                np.tile(same, (len(group), 1)),
+            ]
+        )  # fmt: skip
+
+    def add(self, catch: Catch, group: np.ndarray, rays: int, sample: Sums) -> None:
+        """Add what so many rays of a group have caught to the sample, as BRDF."""
+        scale = 1.0 / (rays * self.omega_there[group])
+        flux = catch.flux * scale[:, None, None, None, None]
+        foretold = flux[FORETOLD] * scale[:, None, None, None, None]
+        backward = not self.from_source
+        sample.brdf[group] += forward(flux[ALL]) if backward else flux[ALL]
+        sample.glints[group] += forward(flux[GLINTS]) if backward else flux[GLINTS]
+        sample.foretold[group] += foretold.swapaxes(-1, -2) if backward else foretold
+        sample.caught[group] += catch.caught[ALL]
+        sample.glints_caught[group] += catch.caught[GLINTS]
+        # A bundle weighs at most as the smaller of the two cones
+        weight = np.minimum(1.0, (np.sin(self.half_there) / np.sin(self.half_here)) ** 2)
+        sample.one[group] = np.maximum(sample.one[group], (weight * scale)[:, None])
 
 
 def on_what(surface: Field | MeshField) -> tuple[Any, Any]:

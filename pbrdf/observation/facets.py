@@ -5,9 +5,11 @@ from functools import partial
 
 import numpy as np
 
+from pbrdf.conventions import direction
 from pbrdf.kernels.cones import facets as observe_facets
 from pbrdf.kernels.cones.matrix import Cones, mean_mueller
 from pbrdf.kernels.cones.mesh_facets import show_mesh_facets
+from pbrdf.kernels.optics.vectors import Vec
 from pbrdf.observation.look import Look, Sums, forward
 from pbrdf.tracer.field import GUARD_HEIGHTS, GUARD_SHARE, Field
 from pbrdf.tracer.mesh_field import MeshField
@@ -48,11 +50,9 @@ def ask_facets(surface: Field | MeshField, sample: Sums, rng: np.random.Generato
         shown = np.zeros((look.n.shape[1], observe_facets.N_SHOWN))
         matrices = np.zeros((len(look.n) if paths else 0, look.n_stokes, look.n_stokes))
         counts = np.zeros(observe_facets.N_FACET_COUNTS, dtype=np.int64)
+        sums = observe_facets.Sums(shown, matrices, counts, room)
         for a, phi_i in enumerate(azimuths):
-            show(
-                _cones(look, g, phi_i), points, most, streams[a], look.optics, shown,
-                matrices, counts, room,
-            )  # fmt: skip
+            show(_cones(look, g, phi_i), points, most, streams[a], look.optics, sums)
         # Points of unknown visibility are taken to be as bright as the others
         known = 1.0
         if counts[observe_facets.N_ASIDE] > 0:
@@ -143,10 +143,8 @@ def _cones(look: Look, g: int, phi_i: float) -> Cones:
     phi_s = phi_i + look.dphi[g]
     theta_i, theta_s = look.theta_i[g], look.theta_s[g]
     return Cones(
-        np.sin(theta_s) * np.cos(phi_s), np.sin(theta_s) * np.sin(phi_s), np.cos(theta_s),
-        np.sin(phi_s), -np.cos(phi_s),
-        np.sin(theta_i) * np.cos(phi_i), np.sin(theta_i) * np.sin(phi_i), np.cos(theta_i),
-        -np.sin(phi_i), np.cos(phi_i),
+        Vec(*direction(theta_s, phi_s)), Vec(np.sin(phi_s), -np.cos(phi_s), 0.0),
+        Vec(*direction(theta_i, phi_i)), Vec(-np.sin(phi_i), np.cos(phi_i), 0.0),
         look.detector, np.cos(look.detector), np.sin(look.detector),
         look.source, np.cos(look.source), np.sin(look.source),
     )  # fmt: skip

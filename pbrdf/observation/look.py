@@ -73,6 +73,19 @@ class Look:
         """Shape (geometries, bounces, wavelengths, stokes, stokes) of the matrices."""
         return self.size, len(BOUNCES), len(self.n), self.n_stokes, self.n_stokes
 
+    def attributes(self) -> dict[str, object]:
+        """Return what a result says of the way it was looked."""
+        return {
+            "max_bounces": self.max_bounces,
+            "phi_i": "uniform" if self.phi_i is None else self.phi_i,
+            "source_half_angle": self.source,
+            "detector_half_angle": self.detector,
+            "hemisphere_samples": self.hemisphere_samples,
+            "sample_decay": self.sample_decay,
+            "estimator": self.estimator,
+            "further_bounces": "counted" if self.counts else "corner rays",
+        }
+
     def solid_angles(self) -> tuple[np.ndarray, np.ndarray]:
         """Projected solid angles of the cones of source and detector. [sr]"""
         return (

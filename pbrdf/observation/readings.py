@@ -170,7 +170,12 @@ def to_dataset(
         coords["wavelength"] = (
             ("wavelength", wavelength, about) if spectral else float(wavelength)
         )
-    counters = {
+    return xr.Dataset(data, coords, attrs=attrs | _counters(seen))
+
+
+def _counters(seen: Readings) -> dict[str, int]:
+    """Return how many rays and facets there were, by their fates."""
+    return {
         "bundles": seen.bundles,
         "path_segments": int(seen.counts[shading.N_SEGMENTS]),
         "rays_escaped": int(seen.counts[shading.N_ESCAPED]),
@@ -182,7 +187,6 @@ def to_dataset(
         "facet_points_seen": int(seen.facet_counts[observe_facets.N_SEEN]),
         "facet_points_aside": int(seen.facet_counts[observe_facets.N_ASIDE]),
     }
-    return xr.Dataset(data, coords, attrs=attrs | counters)
 
 
 def as_scan(result: xr.Dataset) -> xr.Dataset:

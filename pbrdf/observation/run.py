@@ -5,8 +5,7 @@ goniometer, one by one, each with its finite source and detector.
 """
 
 import warnings
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import numpy.typing as npt
@@ -17,23 +16,18 @@ from pbrdf._version import __version__
 from pbrdf.analytic.geometry import flat_geometry
 from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.paths.shading import LEAKED, N_LEAKED, SIDEWAYS, TRUNCATED
-from pbrdf.observation.look import Look, Sight
-from pbrdf.observation.one_sample import look_at
+from pbrdf.observation.look import Look
 from pbrdf.observation.readings import Readings, as_scan, to_dataset
+from pbrdf.observation.samples import look_at_samples
 from pbrdf.scene.scene import Scene
 from pbrdf.scene.write import scene_text
 from pbrdf.surface import (
-    FixedSurface,
-    GaussianSurface,
     HeightMap,
-    MeasuredSurface,
     MeshSurface,
     Surface,
 )
 from pbrdf.tracer import arguments
-from pbrdf.tracer.field import Field
-from pbrdf.tracer.mesh_field import MeshField
-from pbrdf.tracer.schedule import gather
+from pbrdf.tracer.asked import Run
 from pbrdf.validity import attach, lost_light_warnings, lost_ray_warnings
 
 __all__ = ["ESTIMATORS", "as_scan", "observe"]
@@ -169,33 +163,15 @@ def observe(  # noqa: PLR0913  (the public signature)
     >>> float(round(seen.brdf_total[0, 0, 0].item() * solid_angle, 9))
     1.0
     """
-    shape, angles = flat_geometry(theta_i, theta_s, dphi, 0.0)
-    if len(shape) > 1:
-        msg = f"theta_i, theta_s, dphi must be one-dimensional, got shape {shape}."
-        raise ValueError(msg)
-    surface, fixed = scene.surface, isinstance(scene.surface, FixedSurface)
-    if isinstance(surface, MeshSurface) and surface.kind == "bodies" and not surface.period:
-        msg = (
-            "surface must have a mean plane to be observed, got bodies that stand alone. "
-            "Give them a period, or use simulate."
-        )
-        raise ValueError(msg)
-    root = arguments.seed_sequence(seed)
-    rays = arguments.count("n_rays", n_rays, arguments.BATCHES)
-    drawn = arguments.count("realizations", realizations, 1)
-    batched = fixed or drawn == 1
-    samples = max(arguments.BATCHES, drawn) if batched else drawn
-    waves = arguments.wavelengths(wavelength)
-    if len(scene.contaminants) > 0:
-        msg = (
-            f"contaminants must be empty to observe, got {len(scene.contaminants)}. "
-            "Use simulate with source_half_angle and bins as wide as the detector."
-        )
-        raise ValueError(msg)
-    n, kappa, base = arguments.constants(scene, waves)
+    angles = _angles(scene, theta_i, theta_s, dphi)
+    run = Run.asked(
+        scene, root=arguments.seed_sequence(seed), n_rays=n_rays,
+        realizations=realizations, wavelength=wavelength, stokes=stokes,
+        target_rel_error=target_rel_error, workers=workers, progress=progress,
+    )  # fmt: skip
     source = _half_angle("source_half_angle", source_half_angle, angles[0])
     detector = _half_angle("detector_half_angle", detector_half_angle, angles[1])
-    widest, slope = max(source, detector), _rms_slope(surface)
+    widest, slope = max(source, detector), _rms_slope(scene.surface)
     look = Look(
         theta_i=angles[0],
         theta_s=angles[1],
@@ -203,7 +179,7 @@ def observe(  # noqa: PLR0913  (the public signature)
         phi_i=arguments.azimuth(phi_i),
         source=source,
         detector=detector,
-        n_rays=-(-rays * drawn // samples) if batched else rays,
+        n_rays=run.rays_of_sample,
         max_bounces=arguments.count("max_bounces", max_bounces, 1),
         estimator=arguments.one_of("estimator", estimator, ESTIMATORS),
         counts=estimator == "count"
@@ -215,72 +191,31 @@ def observe(  # noqa: PLR0913  (the public signature)
         sample_decay=arguments.in_range(
             "sample_decay", sample_decay, 0.01, 1.0, "1 keeps the sampling as it is."
         ),
-        n=n,
-        kappa=kappa,
-        base=base,
-        n_stokes=arguments.stokes_count(stokes),
+        n=run.n,
+        kappa=run.kappa,
+        base=run.base,
+        n_stokes=run.n_stokes,
     )
     _check_growth(look.hemisphere_samples, look.sample_decay)
-    target = None if target_rel_error is None else arguments.target_error(target_rel_error)
-    arguments.check_scene(scene)
-    judged = arguments.judge_surface(scene, angles[0], waves)
-    notes = [*arguments.scene_warnings(scene, drawn), *judged.notes]
-    if estimator in ("facets", "corners") and widest > WIDE * slope > 0.0:
-        lost = "matrices err by" if estimator == "facets" else "multiple bounces lose"
-        notes.append(
-            f"A cone of half-angle {widest:.3g} rad is wide beside the rms slope "
-            f"{slope:.3g}: with {estimator!r} {lost} up to some per cent. Use 'paths'."
-        )
-    for note in notes:
-        warnings.warn(note, AccuracyWarning, stacklevel=2)
-
-    if batched:
-        shared = (
-            surface
-            if isinstance(surface, FixedSurface)
-            else surface.sample(root.spawn(1)[0])
-        )
-        draw = partial(look_at, _ready(shared), look)
-    else:
-        assert not isinstance(surface, FixedSurface)  # a fixed surface is batched
-        draw = partial(_look_at_realization, surface, look)
-
-    seen = Readings(look)
-    gather(
-        draw, root, lambda sight, _: seen.add(sight), seen.rel_error, samples=samples,
-        target=target, workers=arguments.worker_count(workers), progress=progress,
-    )  # fmt: skip
+    judged = run.judged(angles[0], run.waves)
+    early = [*judged.notes, *_wide_cones(estimator, widest, slope)]
+    _warn(early)
+    seen = look_at_samples(run, look)
     late = lost_ray_warnings(int(seen.counts[N_LEAKED]), seen.bundles)
-    late += _missing_light(
-        seen, ("left_sideways",) if late else ("leaked", "left_sideways")
-    )
+    fates = ("left_sideways",) if late else ("leaked", "left_sideways")
+    late += _missing_light(seen, fates)
     cut = _missing_light(seen, ("truncated",))
     # Told in any case, but no surprise to one who set a low limit
-    for note in [*late, *(cut if look.max_bounces >= MOST_BOUNCES else ())]:
-        warnings.warn(note, AccuracyWarning, stacklevel=2)
-    notes += [*late, *cut, *judged.remarks]
+    _warn([*late, *(cut if look.max_bounces >= MOST_BOUNCES else ())])
     result = to_dataset(
         seen,
-        wavelength=waves,
-        attrs={
-            "seed": int(root.entropy),  # type: ignore[arg-type]
-            "n_rays": rays,
-            "realizations": 1 if batched else seen.samples,
-            "ray_batches": seen.samples if batched else 0,
-            "stderr_excludes_surface": batched,
-            "max_bounces": look.max_bounces,
-            "stokes": stokes,
-            "phi_i": "uniform" if look.phi_i is None else look.phi_i,
-            "source_half_angle": source,
-            "detector_half_angle": detector,
-            "hemisphere_samples": look.hemisphere_samples,
-            "sample_decay": look.sample_decay,
-            "estimator": estimator,
-            "further_bounces": "counted" if look.counts else "corner rays",
+        wavelength=run.waves,
+        attrs=run.attributes(seen.samples)
+        | {
+            **look.attributes(),
             "start": start,
-            "target_rel_error": np.nan if target is None else target,
             "rel_error": seen.rel_error(),
-            "warnings": notes,
+            "warnings": [*early, *late, *cut, *judged.remarks],
             "version": __version__,
             "scene": scene_text(scene),
         },
@@ -288,25 +223,52 @@ def observe(  # noqa: PLR0913  (the public signature)
     return attach(result, judged.numbers, axis="geometry")
 
 
+def _angles(
+    scene: Scene, theta_i: npt.ArrayLike, theta_s: npt.ArrayLike, dphi: npt.ArrayLike
+) -> list[np.ndarray]:
+    """Return theta_i, theta_s, dphi of each geometry, of a scene that can be observed."""
+    shape, angles = flat_geometry(theta_i, theta_s, dphi, 0.0)
+    if len(shape) > 1:
+        msg = f"theta_i, theta_s, dphi must be one-dimensional, got shape {shape}."
+        raise ValueError(msg)
+    surface = scene.surface
+    if isinstance(surface, MeshSurface) and surface.kind == "bodies" and not surface.period:
+        msg = (
+            "surface must have a mean plane to be observed, got bodies that stand alone. "
+            "Give them a period, or use simulate."
+        )
+        raise ValueError(msg)
+    if len(scene.contaminants) > 0:
+        msg = (
+            f"contaminants must be empty to observe, got {len(scene.contaminants)}. "
+            "Use simulate with source_half_angle and bins as wide as the detector."
+        )
+        raise ValueError(msg)
+    return angles
+
+
+def _wide_cones(estimator: str, widest: float, slope: float) -> list[str]:
+    """Say where a cone is too wide for the estimator."""
+    if estimator not in ("facets", "corners") or not widest > WIDE * slope > 0.0:
+        return []
+    lost = "matrices err by" if estimator == "facets" else "multiple bounces lose"
+    return [
+        f"A cone of half-angle {widest:.3g} rad is wide beside the rms slope "
+        f"{slope:.3g}: with {estimator!r} {lost} up to some per cent. Use 'paths'."
+    ]
+
+
+def _warn(notes: Iterable[str]) -> None:
+    """Warn whoever called `observe`."""
+    for note in notes:
+        warnings.warn(note, AccuracyWarning, stacklevel=3)
+
+
 def _missing_light(seen: Readings, fates: tuple[str, ...]) -> list[str]:
     """Say what share of the light met some fate, where it is more than a thousandth."""
     columns = {"leaked": LEAKED, "left_sideways": SIDEWAYS, "truncated": TRUNCATED}
     shares = {fate: seen.energy[:, columns[fate]] for fate in fates}
     return lost_light_warnings(shares, None, seen.look.max_bounces)
-
-
-def _ready(surface: FixedSurface) -> Field | MeshField:
-    """Make a surface ready for tracing."""
-    if isinstance(surface, MeshSurface):
-        return MeshField.of(surface, frozenset(["steep"]))
-    return Field.of(surface)
-
-
-def _look_at_realization(
-    surface: GaussianSurface | MeasuredSurface, look: Look, seed: np.random.SeedSequence
-) -> Sight:
-    heights, rays = seed.spawn(2)
-    return look_at(Field.of(surface.sample(heights)), look, rays)
 
 
 def _rms_slope(surface: Surface) -> float:

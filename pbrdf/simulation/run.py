@@ -1,7 +1,6 @@
 """Monte Carlo prediction of the Mueller BRDF of a scene: section 3 of the paper."""
 
 import warnings
-from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
@@ -14,28 +13,23 @@ import pbrdf.accessor  # noqa: F401  (registers ds.pbrdf)
 from pbrdf.contaminants import Film
 from pbrdf.contaminants.arguments import material_of
 from pbrdf.errors import AccuracyWarning
+from pbrdf.kernels.bodies.events import Media
 from pbrdf.kernels.paths.shading import LEAKED, N_LEAKED, N_SIDE, SIDEWAYS, TRUNCATED
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.pilot import choose
-from pbrdf.simulation.plan import Plan, Tally
+from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.results import to_dataset
+from pbrdf.simulation.samples import trace_samples
 from pbrdf.simulation.single_bounce import SingleBounce, without_rays
 from pbrdf.simulation.skips import chosen_skips, explanation, mesh_explanation
-from pbrdf.simulation.trace import Target, prepare, trace_sample
 from pbrdf.simulation.waves import check_waves, join_waves
-from pbrdf.surface import FixedSurface, HeightMap, MeshSurface
+from pbrdf.surface import HeightMap, MeshSurface
 from pbrdf.tracer import arguments
-from pbrdf.tracer.embree import EmbreeField
+from pbrdf.tracer.asked import Run
 from pbrdf.tracer.field import Field
-from pbrdf.tracer.schedule import gather
 from pbrdf.tracer.thin_films import thin_absorber_warnings
-from pbrdf.tracer.wet_field import (
-    WetField,
-    contaminant_materials,
-    media_of,
-    opaque_drop_notes,
-)
+from pbrdf.tracer.wet_field import contaminant_materials, media_of, opaque_drop_notes
 from pbrdf.validity import (
     Judgement,
     attach,
@@ -172,31 +166,90 @@ def simulate(  # noqa: PLR0913  (the public signature)
     >>> round(float(result.albedo.sel(bounces="1").item()), 6)
     0.04
     """
-    fixed = not arguments.varies(scene)
     root = arguments.seed_sequence(seed)
+    geometry: dict[str, Any] = {
+        "n_theta": n_theta, "n_dphi": n_dphi, "skips": skips, "fold": fold,
+        "source_half_angle": source_half_angle, "max_bounces": max_bounces,
+    }  # fmt: skip
     pilot = partial(
-        simulate, scene, theta_i, phi_i=phi_i, max_bounces=max_bounces,
-        wavelength=wavelength, n_theta=n_theta, n_dphi=n_dphi, stokes="unpolarized",
-        workers=workers, skips=skips, source_half_angle=source_half_angle, fold=fold,
-        variance_reduction=variance_reduction,
+        simulate, scene, theta_i, phi_i=phi_i, wavelength=wavelength,
+        stokes="unpolarized", workers=workers, variance_reduction=variance_reduction,
+        **geometry,
     )  # fmt: skip
     rays, drawn, chosen = _counts(
         n_rays, realizations, target_rel_error, scene, root, pilot
     )
-    batched = fixed or drawn == 1
-    samples = max(arguments.BATCHES, drawn) if batched else drawn
+    run = Run.asked(
+        scene, root=root, n_rays=rays, realizations=drawn, wavelength=wavelength,
+        stokes=stokes, target_rel_error=target_rel_error, workers=workers,
+        progress=progress,
+    )  # fmt: skip
+    plans, several = _plans(run, theta_i, phi_i, **geometry)
+    plan = plans[0]
+    wanted = variance_reduction and not run.batched and wave is None
+    single = without_rays(scene, plans, wanted=wanted)
+    if wave is not None:
+        check_waves(scene, wave, run.waves, stokes, plan.half_angle)
+    # What rays do not see at these wavelengths is no fault where waves do the first bounce
+    judged = run.judged(plan.theta_i, None if wave else run.waves)
+    early = [*judged.notes, *opaque_drop_notes(scene.contaminants, run.waves)]
+    _warn(early)
+    moments, done = trace_samples(run, plans, single)
+
+    laid = _judge_contaminants(scene, moments[0], run.waves)
+    late = [*moments[0].notes, *laid.notes, *_missing_light(moments)]
+    late += _thin_films(scene, moments[0], run.waves)
+    _warn(late)
+    # Told in any case, but no surprise to one who set the limit
+    cut = _cut_light(moments)
+    _warn(() if max_bounces is not None else cut)
+    result = to_dataset(
+        moments,
+        scene,
+        several=several,
+        wavelength=run.waves,
+        attrs=run.attributes(done)
+        | {
+            "max_bounces": plan.max_bounces,
+            "phi_i": phi_i if isinstance(phi_i, str) else np.asarray(phi_i, float).tolist(),
+            "source_half_angle": plan.half_angle,
+            "folded": plan.fold,
+            "intersector": _intersector(scene, plan.skips),
+            "plan": chosen,
+            "variance_reduction": "none" if single is None else "single bounces",
+            "explanation": _explain(scene, plan, single) if explain else [],
+            "contaminants": [str(dict(report)) for report in moments[0].reports],
+            "warnings": [*early, *late, *judged.remarks, *cut],
+        },
+    )  # fmt: skip
+    result = attach(result, {**judged.numbers, **laid.numbers})
+    return result if wave is None else join_waves(result, scene, wave)
+
+
+def _warn(notes: Iterable[str]) -> None:
+    """Warn whoever called `simulate`."""
+    for note in notes:
+        warnings.warn(note, AccuracyWarning, stacklevel=3)
+
+
+def _plans(  # noqa: PLR0913  (arguments of `simulate`)
+    run: Run,
+    theta_i: npt.ArrayLike,
+    phi_i: npt.ArrayLike | str,
+    *,
+    max_bounces: int | None,
+    n_theta: int,
+    n_dphi: int,
+    skips: bool | Iterable[str],
+    source_half_angle: float,
+    fold: bool,
+) -> tuple[list[Plan], bool]:
+    """Plan the rays of each azimuth, and say whether azimuths are a dimension."""
     angles = arguments.zeniths(theta_i)
     azimuths, several = arguments.azimuths(phi_i)
-    waves = arguments.wavelengths(wavelength)
-    n, kappa, base = arguments.constants(scene, waves)
-    media = None
-    if scene.contaminants:
-        covering = contaminant_materials(scene.contaminants)
-        films = [one.material for one in scene.contaminants if isinstance(one, Film)]
-        media = media_of(scene.materials, covering, waves, films)
-    bounces = max_bounces
-    if bounces is None:
-        bounces = MOST_BOUNCES if media is None else MOST_EVENTS
+    media = _media(run)
+    if max_bounces is None:
+        max_bounces = MOST_BOUNCES if media is None else MOST_EVENTS
     allowed = chosen_skips(skips)
     if media is not None and "walk" not in allowed:
         msg = (
@@ -207,91 +260,30 @@ def simulate(  # noqa: PLR0913  (the public signature)
     plan = Plan(
         theta_i=angles,
         phi_i=azimuths[0],
-        n_rays=-(-rays * drawn // samples) if batched else rays,
-        max_bounces=arguments.count("max_bounces", bounces, 1),
-        n=n,
-        kappa=kappa,
-        base=base,
-        n_stokes=arguments.stokes_count(stokes),
+        n_rays=run.rays_of_sample,
+        max_bounces=arguments.count("max_bounces", max_bounces, 1),
+        n=run.n,
+        kappa=run.kappa,
+        base=run.base,
+        n_stokes=run.n_stokes,
         n_theta=arguments.count("n_theta", n_theta, 1),
         n_dphi=arguments.even_count("n_dphi", n_dphi),
         skips=allowed,
         media=media,
         half_angle=arguments.half_angle(source_half_angle, angles),
-        fold=arguments.mirrored(fold, scene, phi_i),
+        fold=arguments.mirrored(fold, run.scene, phi_i),
     )
-    plans = [plan.at(azimuth) for azimuth in azimuths]
-    wanted = variance_reduction and not batched and wave is None
-    single = without_rays(scene, plans, wanted=wanted)
-    target = None if target_rel_error is None else arguments.target_error(target_rel_error)
-    arguments.check_scene(scene)
-    if wave is not None:
-        check_waves(scene, wave, waves, stokes, plan.half_angle)
-    # What rays do not see at these wavelengths is no fault where waves do the first bounce
-    judged = arguments.judge_surface(scene, angles, None if wave else waves)
-    notes = [*arguments.scene_warnings(scene, drawn), *judged.notes]
-    notes += opaque_drop_notes(scene.contaminants, waves)
-    for note in notes:
-        warnings.warn(note, AccuracyWarning, stacklevel=2)
+    return [plan.at(azimuth) for azimuth in azimuths], several
 
-    # Tallies to use again: to make a large one costs more than to clear it
-    spare: deque[Tally] = deque()
-    if batched:
-        # The surface, or the one realisation asked for, stays the same in all batches
-        first = root.spawn(1)[0] if arguments.varies(scene) else root
-        draw = partial(_trace_fixed, _realize(scene, plan, first), plans, spare)
-    else:
-        draw = partial(_trace_realization, scene, plans, single, spare)
 
-    moments = [
-        Moments(one, None if single is None else single[k]) for k, one in enumerate(plans)
-    ]
-
-    def add(tallies: Sequence[Tally], run: Callable[..., Iterable[Any]]) -> None:
-        for one, tally in zip(moments, tallies, strict=True):
-            one.add(tally, run)
-            spare.append(tally.emptied())
-
-    done = gather(
-        draw, root, add, lambda: max(one.rel_error() for one in moments),
-        samples=samples, target=target, workers=arguments.worker_count(workers),
-        progress=progress,
-    )  # fmt: skip
-    laid = _judge_contaminants(scene, moments[0], waves)
-    late = [*moments[0].notes, *laid.notes, *_missing_light(moments)]
-    late += _thin_films(scene, moments[0], waves)
-    for note in late:
-        warnings.warn(note, AccuracyWarning, stacklevel=2)
-    notes += [*late, *judged.remarks]
-    # Told in any case, but no surprise to one who set the limit
-    notes += _cut_light(moments, asked=max_bounces is not None)
-    result = to_dataset(
-        moments,
-        scene,
-        several=several,
-        wavelength=waves,
-        attrs={
-            "seed": int(root.entropy),  # type: ignore[arg-type]
-            "n_rays": rays,
-            "realizations": 1 if batched else done,
-            "ray_batches": done if batched else 0,
-            "stderr_excludes_surface": batched,
-            "max_bounces": plan.max_bounces,
-            "stokes": stokes,
-            "phi_i": phi_i if isinstance(phi_i, str) else np.asarray(phi_i, float).tolist(),
-            "source_half_angle": plan.half_angle,
-            "folded": plan.fold,
-            "target_rel_error": np.nan if target is None else target,
-            "intersector": _intersector(scene, allowed),
-            "plan": chosen,
-            "variance_reduction": "none" if single is None else "single bounces",
-            "explanation": _explain(scene, plan, single) if explain else [],
-            "contaminants": [str(dict(report)) for report in moments[0].reports],
-            "warnings": notes,
-        },
-    )
-    result = attach(result, {**judged.numbers, **laid.numbers})
-    return result if wave is None else join_waves(result, scene, wave)
+def _media(run: Run) -> Media | None:
+    """Tell what light goes through, None on a clean surface."""
+    scene = run.scene
+    if not scene.contaminants:
+        return None
+    covering = contaminant_materials(scene.contaminants)
+    films = [one.material for one in scene.contaminants if isinstance(one, Film)]
+    return media_of(scene.materials, covering, run.waves, films)
 
 
 def _counts(
@@ -308,11 +300,8 @@ def _counts(
         choice = choose(pilot, scene, arguments.target_error(target), root)
         n_rays, realizations = choice.n_rays, choice.realizations
         sentences = choice.sentences
-    rays = arguments.count(
-        "n_rays", N_RAYS if n_rays is None else n_rays, arguments.BATCHES
-    )
-    drawn = 1 if realizations is None else realizations
-    return rays, arguments.count("realizations", drawn, 1), sentences
+    rays = N_RAYS if n_rays is None else n_rays
+    return rays, 1 if realizations is None else realizations, sentences
 
 
 def _judge_contaminants(
@@ -344,14 +333,11 @@ def _missing_light(moments: Sequence[Moments]) -> list[str]:
     return found + lost_light_warnings(shares, plan.theta_i, plan.max_bounces)
 
 
-def _cut_light(moments: Sequence[Moments], *, asked: bool) -> list[str]:
-    """Say how much light was cut off; a warning unless the limit was asked for."""
+def _cut_light(moments: Sequence[Moments]) -> list[str]:
+    """Say how much light was cut off."""
     plan = moments[0].plan
     share = np.max([one.energy() for one in moments], axis=0)[..., TRUNCATED]
-    found = lost_light_warnings({"truncated": share}, plan.theta_i, plan.max_bounces)
-    for note in () if asked else found:
-        warnings.warn(note, AccuracyWarning, stacklevel=3)
-    return found
+    return lost_light_warnings({"truncated": share}, plan.theta_i, plan.max_bounces)
 
 
 def _thin_films(scene: Scene, moments: Moments, waves: np.ndarray | None) -> list[str]:
@@ -361,63 +347,6 @@ def _thin_films(scene: Scene, moments: Moments, waves: np.ndarray | None) -> lis
     return thin_absorber_warnings(
         moments.reports, coverings, scene.materials, angles, waves
     )
-
-
-def _realize(scene: Scene, plan: Plan, seed: np.random.SeedSequence) -> Target:
-    """One realisation of the scene, ready for tracing."""
-    surface = scene.surface
-    if not isinstance(surface, FixedSurface):
-        surface = surface.sample(seed)
-    target = prepare(surface, plan.skips)
-    if plan.media is None:
-        return target
-    # Contaminants exclude meshes and the Embree route
-    assert isinstance(target, Field)
-    assert isinstance(surface, HeightMap)
-    return WetField.of(
-        target, surface, scene.contaminants, plan.media, seed,
-        skips_deep="deep" in plan.skips,
-    )  # fmt: skip
-
-
-def _taken(spare: deque[Tally]) -> Tally | None:
-    try:
-        return spare.pop()
-    except IndexError:
-        return None
-
-
-def _trace_fixed(
-    target: Target,
-    plans: Sequence[Plan],
-    spare: deque[Tally],
-    seed: np.random.SeedSequence,
-) -> list[Tally]:
-    """One sample of every azimuth: the same surface, streams and entry points."""
-    return [trace_sample(target, plan, seed, _taken(spare)) for plan in plans]
-
-
-def _trace_realization(
-    scene: Scene,
-    plans: Sequence[Plan],
-    single: Sequence[SingleBounce] | None,
-    spare: deque[Tally],
-    seed: np.random.SeedSequence,
-) -> list[Tally]:
-    heights, rays, looks = seed.spawn(3)
-    if single is None:
-        return _trace_fixed(_realize(scene, plans[0], heights), plans, spare, rays)
-    if all(one.everything for one in single):
-        tallies = [_taken(spare) or Tally.empty(plan) for plan in plans]
-        terrain = None
-    else:
-        target = _realize(scene, plans[0], heights)
-        tallies = _trace_fixed(target, plans, spare, rays)
-        assert isinstance(target, (Field, EmbreeField))  # no bodies on it
-        terrain = (target if isinstance(target, Field) else target.field).terrain
-    for plan, one, tally in zip(plans, single, tallies, strict=True):
-        one.add(terrain, plan, looks, tally)
-    return tallies
 
 
 def _explain(scene: Scene, plan: Plan, single: Sequence[SingleBounce] | None) -> list[str]:

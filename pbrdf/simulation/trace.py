@@ -110,15 +110,12 @@ def trace_sample(
                 plan.n_stokes, places, bins,
             )  # fmt: skip
             continue
+        sink = (record, waiting, light, plan.optics, bins)
         if sweeps:
-            sweep_batch(
-                field.terrain, source, line, record, waiting, light, plan.optics, bins
-            )
+            sweep_batch(field.terrain, source, line, *sink)
         else:
             tree = target.tree() if isinstance(target, EmbreeField) else None
-            trace_batch(
-                field.terrain, tree, source, record, waiting, light, plan.optics, bins
-            )
+            trace_batch(field.terrain, tree, source, *sink)
         if tally.spectra:
             close_sums(light, plan.n_stokes, bins.lit)
     return tally

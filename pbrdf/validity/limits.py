@@ -114,22 +114,27 @@ theta_i is 23 with a typical radius of curvature R of 42.9 um, and should be abo
             f"{waves[np.argmin(shortest)]:g} um: such roughness diffracts"
             f"{_others(shortest < 1.0)}."
         )
-    coarse = not rough.generated and rough.smooth < LEAST_SMOOTH and cell.max() > 0.5
-    if coarse and rough.facets:
-        remark = (
+    remarks: list[str] = []
+    if not rough.generated and rough.smooth < LEAST_SMOOTH and cell.max() > 0.5:
+        said = remarks if rough.facets else notes
+        said.append(_between_nodes(rough, waves[np.argmax(cell)]))
+    return Judgement(numbers=numbers, notes=tuple(notes), remarks=tuple(remarks))
+
+
+def _between_nodes(rough: Roughness, wave: float) -> str:
+    """Say that facets or cells are wide beside the wavelength [um], and not smooth."""
+    if rough.facets:
+        return (
             f"Facets of {rough.cell:.3g} um are wider than half the wavelength, and "
             f"normals change from one to the next (correlation {rough.smooth:.2g}): they "
             "are traced as flat faces. Refine the mesh if they stand for a smooth surface."
         )
-        return Judgement(numbers=numbers, notes=tuple(notes), remarks=(remark,))
-    if coarse:
-        notes.append(
-            f"Cells of {rough.cell:.3g} um are wider than half the wavelength, "
-            f"{waves[np.argmax(cell)]:g} um, and slopes change from cell to cell "
-            f"(correlation {rough.smooth:.2g}): roughness between them, which the map does "
-            "not hold, scatters too. Measure with smaller pixels."
-        )
-    return Judgement(numbers=numbers, notes=tuple(notes))
+    return (
+        f"Cells of {rough.cell:.3g} um are wider than half the wavelength, "
+        f"{wave:g} um, and slopes change from cell to cell "
+        f"(correlation {rough.smooth:.2g}): roughness between them, which the map does "
+        "not hold, scatters too. Measure with smaller pixels."
+    )
 
 
 def resolution_warnings(rough: Roughness) -> list[str]:

@@ -17,7 +17,8 @@ from pbrdf.kernels.bodies.beams import KX, KY, KZ, N_STATE, Room, X, Y, Z
 from pbrdf.kernels.bodies.events import N_HIT, next_event
 from pbrdf.kernels.bodies.transparent import follow_beam, launch_beam
 from pbrdf.kernels.paths import shading
-from pbrdf.kernels.terrain.entry import Source, entry_line, first_ray, line_beam, wrap_into
+from pbrdf.kernels.paths.random import Draw
+from pbrdf.kernels.terrain.entry import Source, entry_point, rays_of_line
 from pbrdf.kernels.terrain.sweep import N_FIRST
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.skips import SKIPS
@@ -39,16 +40,12 @@ def record_segments(world, source, z_start, room, tally, segments):
     count = 0
     terrain, launch = world.terrain, source.launch
     for line in range(source.n_lines):
-        start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = (
-            entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
+        beam, first, rays, points = rays_of_line(
+            line, source, terrain.pitch_x, terrain.pitch_y
         )
-        beam = line_beam(line, source)
-        first = first_ray(line, source)
-        rays = first_ray(line + 1, source) - first
         for ray in range(rays):
-            s = length * ((ray + offset) / rays)
-            x = wrap_into(start_x + speed_x * s, launch[0], launch[2]) * terrain.pitch_x
-            y = wrap_into(start_y + speed_y * s, launch[1], launch[3]) * terrain.pitch_y
+            x, y = entry_point(points, ray, rays, launch)
+            x, y = x * terrain.pitch_x, y * terrain.pitch_y
             launch_beam(room.state, x, y, z_start, beam, 4)
             top = 0
             step = 0
@@ -58,10 +55,8 @@ def record_segments(world, source, z_start, room, tally, segments):
                     segments[count, 3 + column] = room.state[top, KX + column]
                 count += 1
                 kind = next_event(world, room.state, top, room.hit)
-                top = follow_beam(
-                    world, 0, top, kind, source.stream, first + ray, step, cos_phi, sin_phi,
-                    1024, 4, room, tally,
-                )  # fmt: skip
+                draw = Draw(source.stream, first + ray, 2 * step)
+                top = follow_beam(world, 0, top, kind, draw, beam, 1024, 4, room, tally)
                 step += 1
     return count
 

@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 from pbrdf import HeightMap, Material, Scene, observe
 from pbrdf.conventions import direction
 from pbrdf.kernels.cones.lens import lens_direction, lens_flux
+from pbrdf.kernels.optics.vectors import Vec
 from tests.reference_optics import path_mueller, spherical
 
 LOSSY = Material(1.9, 0.4)
@@ -50,7 +51,7 @@ def test_flux_and_directions_of_a_lens(between, half_1, half_2):
     # The directions drawn: inside both caps, and with the mean of the cosine-weighted lens
     drawn = np.array(
         [
-            lens_direction(*axis, *other, half_1, half_2, *normal, 7, name)
+            lens_direction(Vec(*axis), Vec(*other), half_1, half_2, Vec(*normal), 7, name)
             for name in range(4000)
         ]
     )

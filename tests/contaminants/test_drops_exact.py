@@ -12,6 +12,7 @@ from pbrdf.conventions import detector_bins
 from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.bodies.beams import KX, KY, KZ, N_STATE
 from pbrdf.kernels.bodies.interfaces import refract_beam
+from pbrdf.kernels.optics.vectors import Vec
 from tests.contaminants.scenes import assert_closed, assert_within, clean_counters
 from tests.reference_optics import fresnel, path_mueller
 
@@ -284,11 +285,11 @@ def test_c14_prism_turns_light_by_the_least_angle(n, turn):
     start = np.array([np.cos(incidence), np.sin(incidence), 0.0])
     state = np.zeros((1, N_STATE))
     state[0, [KX, KY, KZ]] = start
-    refract_beam(state, 0, *into, np.cos(incidence), n)
+    refract_beam(state, 0, Vec(*into), np.cos(incidence), n)
     inside = state[0, [KX, KY, KZ]].copy()
     # The second side is turned by 60 degrees; its normal towards the beam
     out = -np.array([np.cos(np.pi / 3), np.sin(np.pi / 3), 0.0])
-    refract_beam(state, 0, *out, float(-inside @ out), 1 / n)
+    refract_beam(state, 0, Vec(*out), float(-inside @ out), 1 / n)
     end = state[0, [KX, KY, KZ]]
     assert_allclose(np.rad2deg(np.arccos(start @ end)), turn, atol=1e-6)
 

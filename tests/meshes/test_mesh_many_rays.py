@@ -92,8 +92,9 @@ def test_a_million_faces_load_and_trace_in_bounded_time_and_memory(tmp_path):
     # In a process of its own: to make the file takes more memory than to read it
     path = str(tmp_path / "million.stl")
     period = printed(MAKE, path)
-    # A run that compiles kernels takes more memory than the mesh, and two workers that compile
-    # the same kernel at once may lose one's entry of the cache: the least of three runs counts
+    # A run that compiles kernels takes more memory than the mesh, and two workers that
+    # compile the same kernel at once may lose one's entry of the cache: the least of three
+    # runs counts
     for _ in range(3):
         words = printed(MILLION, path, *period)
         faces, loaded, peak = (float(word) for word in words)

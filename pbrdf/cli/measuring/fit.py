@@ -103,7 +103,7 @@ def command(
     """
     given = dict(locals())
     from pbrdf.cli.progress import progress_bar
-    from pbrdf.cli.reading import read_material, read_scan
+    from pbrdf.cli.reading import read_material
     from pbrdf.cli.staging import staged_folder
 
     cones = {
@@ -114,13 +114,7 @@ def command(
         columns, azimuth_of_forward, angles, quantity, normalised
     )
     declared |= {name: math.radians(v) for name, v in cones.items() if v is not None}
-    measured = {
-        path.stem: read_scan(path, wavelength=wavelength, declared=declared)
-        for path in scans
-    }
-    if len(measured) < len(scans):
-        msg = "scans must have names of their own, got two files of one name. Rename one."
-        raise ValueError(msg)
+    measured = _read_scans(scans, wavelength, declared)
 
     from fitting.readings.masks import blocked_detector, zeros
     from fitting.run import fit as fit_model
@@ -167,6 +161,22 @@ def command(
     typer.echo(result.summary())
     if not result.converged:
         raise typer.Exit(1)
+
+
+def _read_scans(
+    paths: list[Path], wavelength: float | None, declared: dict[str, Any]
+) -> "dict[str, xr.Dataset]":
+    """Return the scans of several files by their names."""
+    from pbrdf.cli.reading import read_scan
+
+    found = {
+        path.stem: read_scan(path, wavelength=wavelength, declared=declared)
+        for path in paths
+    }
+    if len(found) < len(paths):
+        msg = "scans must have names of their own, got two files of one name. Rename one."
+        raise ValueError(msg)
+    return found
 
 
 def _separate(text: str) -> dict[str, str]:

@@ -13,6 +13,7 @@ from pbrdf.cli.options import Kind
 
 if TYPE_CHECKING:
     from fitting.pipeline import PipelineResult
+    from pbrdf import Material
 
 
 def command(
@@ -61,18 +62,11 @@ def command(
     from pbrdf.cli.staging import staged_folder
 
     target = output or Path(f"{scan.stem}-model")
-    material = read_material(n, kappa, material_file)
-    if material is None:
-        msg = "--n must be given, got none. Or give a --material-file."
-        raise ValueError(msg)
+    material = _needed(read_material(n, kappa, material_file))
     declared = declaring.declarations(
-        scan_columns,
-        azimuth_of_forward,
-        angles,
-        quantity,
-        normalised,
+        scan_columns, azimuth_of_forward, angles, quantity, normalised,
         option="--scan-columns",
-    )
+    )  # fmt: skip
     with ExitStack() as stack:
         # A target that may not be written is refused before the work, not after
         stage = stack.enter_context(staged_folder(target, force=force))
@@ -105,28 +99,37 @@ def command(
             accept=options.names(accept),
             progress=bars.update,
         )
+        begin, index = perf_counter(), material_file or f"{n:g} + {kappa:g} i"
         inputs = {
-            "surface": surface.name,
-            "scan": scan.name,
-            "index": material_file or f"{n:g} + {kappa:g} i",
-            "fitted": free,
-        }
-        begin = perf_counter()
+            "surface": surface.name, "scan": scan.name, "index": index, "fitted": free
+        }  # fmt: skip
         record = record_of(
             {"surface": surface, "scan": scan, "material": material_file},
             command="pipeline",
             options=options.recorded(given),
         )
-        write_report(
-            result, stage, inputs=inputs, seconds={"reading": reading}, record=record
-        )
+        seconds = {"reading": reading}
+        write_report(result, stage, inputs=inputs, seconds=seconds, record=record)
         writing = perf_counter() - begin
     for line in summary(result):
         typer.echo(line)
-    total = reading + sum(result.seconds.values()) + writing
-    stages = {"reading": reading, **result.seconds, "report": writing, "in all": total}
-    typer.echo("\nSeconds: " + ", ".join(f"{name} {s:.1f}" for name, s in stages.items()))
+    stages = {"reading": reading, **result.seconds, "report": writing}
+    typer.echo(_times(stages))
     typer.echo(f"Report:  {target / 'report.html'}")
+
+
+def _needed(material: "Material | None") -> "Material":
+    """Return the material, refused where none is given."""
+    if material is None:
+        msg = "--n must be given, got none. Or give a --material-file."
+        raise ValueError(msg)
+    return material
+
+
+def _times(stages: dict[str, float]) -> str:
+    """Return the seconds of each stage and of all, in one line."""
+    whole = stages | {"in all": sum(stages.values())}
+    return "\nSeconds: " + ", ".join(f"{name} {s:.1f}" for name, s in whole.items())
 
 
 def summary(result: "PipelineResult") -> Iterator[str]:

@@ -12,6 +12,9 @@ from pbrdf.cli import options
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pbrdf import Material
+    from pbrdf.surface import Surface
+
 
 # Columns of the table: a quantity, its error, what dew adds to it and the error of that
 VARIABLES = ("signature", "signature_stderr", "added", "added_stderr")
@@ -68,11 +71,21 @@ def command(
     n_rays: Annotated[
         int,
         typer.Option(
-            "--n-rays", min=1000, max=10**8, help="Rays an incidence, state and run."
+            "--n-rays",
+            min=1000,
+            max=10**9,
+            help="Rays an incidence, state and run: fewer than simulate's, as means over "
+            "regions are compared, not bins.",
         ),
     ] = 20_000,
     runs: Annotated[
-        int, typer.Option(min=4, max=10_000, help="Independent runs, for the errors.")
+        int,
+        typer.Option(
+            min=4,
+            max=10_000,
+            help="Independent runs, each with a surface and drops of its own: as "
+            "realisations, but compared dry and wet one by one.",
+        ),
     ] = 8,
     seed: options.Seed = 0,
     workers: options.Workers = None,
@@ -92,19 +105,12 @@ def command(
 
     if scene is None:
         # A patch of a millimetre with facets of a fifteenth of the length
-        surface: pbrdf.scene.scene.Surface = pbrdf.GaussianSurface(
+        surface: Surface = pbrdf.GaussianSurface(
             shape=(512, 512), spacing=2.0, corr_length=30.0, slope_rms=slope_rms
         )
         substrate = pbrdf.Material(n, diffuse_albedo=diffuse_albedo)
     else:
-        loaded = pbrdf.load_scene(scene)
-        if loaded.contaminants or not isinstance(loaded.substrate, pbrdf.Material):
-            msg = (
-                f"--scene must hold a clean surface of one material, got {scene.name}. "
-                "The water is laid on it by the options."
-            )
-            raise ValueError(msg)
-        surface, substrate = loaded.surface, loaded.substrate
+        surface, substrate = _clean(scene)
     angles = options.angles(contact_angles, "--contact-angles-deg", below=180.0)
     incidences = options.incidences(theta_i)
     target = output or Path("dew")
@@ -149,6 +155,20 @@ def command(
         for line in table(result):
             typer.echo(line)
     typer.echo(f"Result: {target}")
+
+
+def _clean(scene: Path) -> "tuple[Surface, Material]":
+    """Return surface and material of a scene file, which must be dry."""
+    import pbrdf
+
+    loaded = pbrdf.load_scene(scene)
+    if loaded.contaminants or not isinstance(loaded.substrate, pbrdf.Material):
+        msg = (
+            f"--scene must hold a clean surface of one material, got {scene.name}. "
+            "The water is laid on it by the options."
+        )
+        raise ValueError(msg)
+    return loaded.surface, loaded.substrate
 
 
 def _write_tables_and_figures(results: "list[xr.Dataset]", stage: Path) -> None:

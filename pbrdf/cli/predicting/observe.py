@@ -46,12 +46,7 @@ def command(
             help="View angles in the plane, by commas; positive on the specular side.",
         ),
     ] = "-60,-45,-30,-15,0,15,20,25,30,35,40,45,60",
-    phi_i: Annotated[
-        str,
-        typer.Option(
-            "--phi-i-deg", help="Azimuth of the source, or uniform for its average."
-        ),
-    ] = "uniform",
+    phi_i: options.Azimuth = "uniform",
     source_half_angle: Annotated[
         float,
         typer.Option(
@@ -69,8 +64,8 @@ def command(
     ] = 0.5,
     output: options.Output = None,
     force: options.Force = False,
-    n_rays: options.Rays = 20_000,
-    realizations: options.Realizations = 32,
+    n_rays: options.Bundles = 20_000,
+    realizations: options.Realizations = 16,
     target: options.Target = None,
     max_bounces: Annotated[
         int, typer.Option(min=1, max=10_000, help="Where paths are cut.")

@@ -9,7 +9,7 @@ are needed.
 import math
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.bins.binning import HALF_PI, TWO_PI
+from pbrdf.kernels.bins.binning import HALF_PI
 from pbrdf.kernels.optics.fresnel import reflection_elements
 from pbrdf.kernels.optics.fresnel_table import TOLERANCE
 
@@ -46,8 +46,8 @@ def cosine_ranges(theta_i, spread, ranges):
         for j in range(n_dphi):
             # Centred on 0 and pi, and the same on both sides of the plane of incidence
             side = min(j, n_dphi - j)
-            dphi_low = max(side - 0.5, 0.0) * TWO_PI / n_dphi
-            dphi_high = min((side + 0.5) * TWO_PI / n_dphi, math.pi)
+            dphi_low = max(side - 0.5, 0.0) * math.tau / n_dphi
+            dphi_high = min((side + 0.5) * math.tau / n_dphi, math.pi)
             least, most = angle_range(theta_i, low, high, dphi_low, dphi_high)
             wide = min(0.5 * math.acos(max(least, -1.0)) + 0.5 * spread, HALF_PI)
             narrow = max(0.5 * math.acos(min(most, 1.0)) - 0.5 * spread, 0.0)

@@ -12,7 +12,6 @@ from pbrdf.kernels import jit
 
 HALF_PI = 0.5 * math.pi
 PI = math.pi
-TWO_PI = 2.0 * math.pi
 
 
 @jit
@@ -26,8 +25,8 @@ def bin_edges(n_theta, n_dphi):
     zenith[n_theta] = -1.0
     azimuth = np.empty((n_dphi, 2))
     for k in range(n_dphi):
-        azimuth[k, 0] = math.cos(TWO_PI * (k - 0.5) / n_dphi)
-        azimuth[k, 1] = math.sin(TWO_PI * (k - 0.5) / n_dphi)
+        azimuth[k, 0] = math.cos(math.tau * (k - 0.5) / n_dphi)
+        azimuth[k, 1] = math.sin(math.tau * (k - 0.5) / n_dphi)
     return zenith, azimuth
 
 
@@ -52,7 +51,7 @@ def rough_azimuth(x, y):
         angle = HALF_PI - angle
     if x < 0.0:
         angle = PI - angle
-    return TWO_PI - angle if y < 0.0 else angle
+    return math.tau - angle if y < 0.0 else angle
 
 
 @jit(forceinline=True)
@@ -63,7 +62,7 @@ def rough_place(x, y, z, cos_phi_i, sin_phi_i, n_theta, n_dphi):
     across = y * cos_phi_i - x * sin_phi_i
     return (
         rough_arccos(z) * (n_theta / HALF_PI),
-        rough_azimuth(along, across) * (n_dphi / TWO_PI) + 0.5,
+        rough_azimuth(along, across) * (n_dphi / math.tau) + 0.5,
     )
 
 

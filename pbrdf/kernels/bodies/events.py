@@ -48,7 +48,10 @@ from pbrdf.kernels.bodies.bodies import (
     body_normal,
     next_body,
 )
-from pbrdf.kernels.bodies.interfaces import GRAZING
+from pbrdf.kernels.bodies.interfaces import way_of_beam
+from pbrdf.kernels.optics.light import GRAZING
+from pbrdf.kernels.optics.vectors import Vec, dot, opposite
+from pbrdf.kernels.paths.ray_bounce import normal_of_slopes
 from pbrdf.kernels.terrain.heightfield import (
     ESCAPED,
     HIT,
@@ -286,9 +289,8 @@ def normal_at(world, state, top, kind, hit):
             world.bodies, k, state[top, X] - hit[HIT_X], state[top, Y] - hit[HIT_Y],
             state[top, Z] - world.bodies.z[k],
         )  # fmt: skip
-        if kind == BODY_OUT:
-            n_x, n_y, n_z = -n_x, -n_y, -n_z
-        return n_x, n_y, n_z
+        normal = Vec(n_x, n_y, n_z)
+        return opposite(normal) if kind == BODY_OUT else normal
     slope_x = 0.0
     slope_y = 0.0
     if state[top, FACET] >= 0.0:
@@ -296,17 +298,15 @@ def normal_at(world, state, top, kind, hit):
             world.terrain, int(state[top, CELL_I]), int(state[top, CELL_J]),
             int(state[top, FACET]),
         )  # fmt: skip
-    scale = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
-    if kind == FILM_UP:
-        scale = -scale
-    return -slope_x * scale, -slope_y * scale, scale
+    normal, _ = normal_of_slopes(slope_x, slope_y)
+    return opposite(normal) if kind == FILM_UP else normal
 
 
 @jit(forceinline=True)
-def set_rate(state, top, n_x, n_y, n_z):
+def set_rate(state, top, normal):
     """Speed at which the beam leaves the facet it starts on, up or down from it."""
-    along = state[top, KX] * n_x + state[top, KY] * n_y + state[top, KZ] * n_z
-    state[top, RATE] = max(abs(along) / abs(n_z), GRAZING)
+    along = dot(way_of_beam(state, top), normal)
+    state[top, RATE] = max(abs(along) / abs(normal.z), GRAZING)
 
 
 @jit(forceinline=True)

@@ -9,30 +9,52 @@ import math
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.bodies.beams import KX, KY, KZ, MUELLER, SX, SY, SZ
-from pbrdf.kernels.optics.frames import PARALLEL, turn_frame
+from pbrdf.kernels.optics.frames import PARALLEL, axis_of_exit, turn_frame
+from pbrdf.kernels.optics.light import (
+    cosine_of_hit,
+    direction_about,
+    mirror_image,
+    reflected,
+    returned,
+    turned,
+)
+from pbrdf.kernels.optics.vectors import Vec, cross, dot, scaled, unit
 
-# Smallest cosine of incidence: rounding may leave a grazing beam parallel to a surface
-GRAZING = 1e-15
-TWO_PI = 2.0 * math.pi
+# Rows of the matrix of a beam, in its row of the stack
+ROW_I, ROW_Q, ROW_U, ROW_V = MUELLER, MUELLER + 4, MUELLER + 8, MUELLER + 12
 
 
 @jit(forceinline=True)
-def set_direction(state, top, k_x, k_y, k_z):
+def way_of_beam(state, top):
+    """Direction of the beam."""
+    return Vec(state[top, KX], state[top, KY], state[top, KZ])
+
+
+@jit(forceinline=True)
+def axis_of_beam(state, top):
+    """Axis s of the beam."""
+    return Vec(state[top, SX], state[top, SY], state[top, SZ])
+
+
+@jit(forceinline=True)
+def set_direction(state, top, k):
     """Give the beam a direction, as a unit vector."""
-    scale = 1.0 / math.sqrt(k_x * k_x + k_y * k_y + k_z * k_z)
-    state[top, KX] = k_x * scale
-    state[top, KY] = k_y * scale
-    state[top, KZ] = k_z * scale
+    state[top, KX], state[top, KY], state[top, KZ] = unit(k)
+
+
+@jit(forceinline=True)
+def set_axis(state, top, s):
+    """Give the beam its s axis."""
+    state[top, SX], state[top, SY], state[top, SZ] = s
 
 
 @jit(forceinline=True)
 def turn_columns(state, top, columns, c2, s2):
-    """Turn the frame of the outgoing Stokes vector, paper eq. (11)."""
+    """Turn the frame of the outgoing Stokes vector."""
     for column in range(columns):
-        q = state[top, MUELLER + 4 + column]
-        u = state[top, MUELLER + 8 + column]
-        state[top, MUELLER + 4 + column] = c2 * q + s2 * u
-        state[top, MUELLER + 8 + column] = c2 * u - s2 * q
+        state[top, ROW_Q + column], state[top, ROW_U + column] = turned(
+            c2, s2, state[top, ROW_Q + column], state[top, ROW_U + column]
+        )
 
 
 @jit(forceinline=True)
@@ -44,93 +66,75 @@ def scale_columns(state, top, columns, factor):
 
 
 @jit(forceinline=True)
-def apply_elements(state, top, columns, a, b, c, d):
-    """Multiply by [[a, b], [b, a]] and [[c, -d], [d, c]], paper eq. (10)."""
+def apply_elements(state, top, columns, elements):
+    """Reflect or refract the matrix of the beam."""
     for column in range(columns):
-        i = state[top, MUELLER + column]
-        q = state[top, MUELLER + 4 + column]
-        u = state[top, MUELLER + 8 + column]
-        v = state[top, MUELLER + 12 + column]
-        state[top, MUELLER + column] = a * i + b * q
-        state[top, MUELLER + 4 + column] = b * i + a * q
-        state[top, MUELLER + 8 + column] = c * u - d * v
-        state[top, MUELLER + 12 + column] = d * u + c * v
+        (
+            state[top, ROW_I + column], state[top, ROW_Q + column],
+            state[top, ROW_U + column], state[top, ROW_V + column],
+        ) = reflected(
+            elements, state[top, ROW_I + column], state[top, ROW_Q + column],
+            state[top, ROW_U + column], state[top, ROW_V + column],
+        )  # fmt: skip
 
 
 @jit(forceinline=True)
-def meet(state, top, columns, n_x, n_y, n_z):
+def come_out(state, top, columns, a_in, b_in, a_out, b_out, base):
+    """Take a beam through the interface to the diffuse base, and out again."""
+    for column in range(columns):
+        state[top, ROW_I + column], state[top, ROW_Q + column] = returned(
+            base, a_in, b_in, a_out, b_out,
+            state[top, ROW_I + column], state[top, ROW_Q + column],
+        )  # fmt: skip
+        state[top, ROW_U + column] = 0.0
+        state[top, ROW_V + column] = 0.0
+
+
+@jit(forceinline=True)
+def meet(state, top, columns, normal):
     """Turn the frame into the plane of incidence; returns the cosine of incidence.
 
     The normal looks towards the beam.
     """
-    k_x, k_y, k_z = state[top, KX], state[top, KY], state[top, KZ]
-    w_x = k_y * n_z - k_z * n_y
-    w_y = k_z * n_x - k_x * n_z
-    w_z = k_x * n_y - k_y * n_x
-    c2, s2 = turn_frame(
-        k_x, k_y, k_z, state[top, SX], state[top, SY], state[top, SZ], w_x, w_y, w_z
-    )
-    square = w_x * w_x + w_y * w_y + w_z * w_z
+    k = way_of_beam(state, top)
+    w = cross(k, normal)
+    c2, s2 = turn_frame(k, axis_of_beam(state, top), w)
+    square = dot(w, w)
     if square > PARALLEL:
-        scale = 1.0 / math.sqrt(square)
-        state[top, SX] = w_x * scale
-        state[top, SY] = w_y * scale
-        state[top, SZ] = w_z * scale
+        set_axis(state, top, scaled(w, 1.0 / math.sqrt(square)))
         turn_columns(state, top, columns, c2, s2)
-    return min(max(-(k_x * n_x + k_y * n_y + k_z * n_z), GRAZING), 1.0)
+    return min(cosine_of_hit(k, normal), 1.0)
 
 
 @jit(forceinline=True)
-def reflect_beam(state, top, n_x, n_y, n_z, cos_in):
+def reflect_beam(state, top, normal, cos_in):
     """Turn the beam to its mirror direction."""
-    set_direction(
-        state, top,
-        state[top, KX] + 2.0 * cos_in * n_x,
-        state[top, KY] + 2.0 * cos_in * n_y,
-        state[top, KZ] + 2.0 * cos_in * n_z,
-    )  # fmt: skip
+    set_direction(state, top, mirror_image(way_of_beam(state, top), normal, cos_in))
 
 
 @jit(forceinline=True)
-def refract_beam(state, top, n_x, n_y, n_z, cos_in, ratio):
+def refract_beam(state, top, normal, cos_in, ratio):
     """Turn the beam to its direction behind an interface of relative index `ratio`."""
     # Snell: what lies along the interface shrinks by the ratio
     cos_out = math.sqrt((ratio - 1.0) * (ratio + 1.0) + cos_in * cos_in) / ratio
     along = cos_in / ratio - cos_out
+    k = way_of_beam(state, top)
     set_direction(
         state, top,
-        state[top, KX] / ratio + along * n_x,
-        state[top, KY] / ratio + along * n_y,
-        state[top, KZ] / ratio + along * n_z,
+        Vec(
+            k.x / ratio + along * normal.x,
+            k.y / ratio + along * normal.y,
+            k.z / ratio + along * normal.z,
+        ),
     )  # fmt: skip
 
 
 @jit(forceinline=True)
-def send_out(state, top, n_x, n_y, n_z, sine, cosine, draw):
+def send_out(state, top, normal, sine, cosine, draw):
     """Send the beam out at an angle to a normal, at a random azimuth about it.
 
     Its frame is then that of the plane of exit, e_s along k x n.
     """
-    # Axes across the normal (Duff et al. 2017)
-    sign = 1.0 if n_z >= 0.0 else -1.0
-    share = -1.0 / (sign + n_z)
-    mixed = n_x * n_y * share
-    a = sine * math.cos(TWO_PI * draw)
-    b = sine * math.sin(TWO_PI * draw)
-    b1_x, b1_y, b1_z = 1.0 + sign * n_x * n_x * share, sign * mixed, -sign * n_x
-    b2_x, b2_y, b2_z = mixed, sign + n_y * n_y * share, -n_y
-    set_direction(
-        state, top,
-        a * b1_x + b * b2_x + cosine * n_x,
-        a * b1_y + b * b2_y + cosine * n_y,
-        a * b1_z + b * b2_z + cosine * n_z,
-    )  # fmt: skip
-    # k x n, of length sine; along the normal every axis across it serves
-    s_x, s_y, s_z = b1_x, b1_y, b1_z
-    if sine > 0.0:
-        s_x = (b * b1_x - a * b2_x) / sine
-        s_y = (b * b1_y - a * b2_y) / sine
-        s_z = (b * b1_z - a * b2_z) / sine
-    state[top, SX] = s_x
-    state[top, SY] = s_y
-    state[top, SZ] = s_z
+    k = unit(direction_about(normal, sine, cosine, draw))
+    state[top, KX], state[top, KY], state[top, KZ] = k
+    set_axis(state, top, axis_of_exit(k, normal))

@@ -32,9 +32,9 @@ from pbrdf.kernels.bodies.events import (
     LEVEL,
     NO_FILM,
 )
-from pbrdf.kernels.bodies.interfaces import GRAZING
 from pbrdf.kernels.optics.absorbing import interface_elements, normal_wave
 from pbrdf.kernels.optics.fresnel import reflection_elements, transmission_elements
+from pbrdf.kernels.optics.light import GRAZING, cosine_law
 
 # Optical depth of which less is left than the rounding of a double, exp(-36.9) = 1e-16
 DEEP = 36.9
@@ -138,13 +138,15 @@ def both_elements(media, w, before, after, index, cos_in):
     n_1, n_2 = media.n[w, before], media.n[w, after]
     kappa_1, kappa_2 = media.kappa[w, before], media.kappa[w, after]
     if kappa_1 > 0.0 or kappa_2 > 0.0:
-        return interface_elements(cos_in, index, n_1, kappa_1, n_2, kappa_2)
+        a, b, c, d, a_t, b_t, c_t, d_t, ratio = interface_elements(
+            cos_in, index, n_1, kappa_1, n_2, kappa_2
+        )
+        return (a, b, c, d), (a_t, b_t, c_t, d_t), ratio
     ratio = n_2 / n_1
-    a, b, c, d = reflection_elements(cos_in, ratio, 0.0)
+    back = reflection_elements(cos_in, ratio, 0.0)
     if (ratio - 1.0) * (ratio + 1.0) + cos_in * cos_in <= 0.0:
-        return a, b, c, d, 0.0, 0.0, 0.0, 0.0, 0.0
-    a_t, b_t, c_t, d_t = transmission_elements(cos_in, ratio, 0.0)
-    return a, b, c, d, a_t, b_t, c_t, d_t, ratio
+        return back, (0.0, 0.0, 0.0, 0.0), 0.0
+    return back, transmission_elements(cos_in, ratio, 0.0), ratio
 
 
 @jit(forceinline=True)
@@ -172,14 +174,14 @@ def solid_elements(media, w, solid, medium, index, cos_in):
             cos_in, index, media.n[w, medium], media.kappa[w, medium],
             media.solid_n[w, solid], media.solid_kappa[w, solid],
         )  # fmt: skip
-        return a, b, c, d, a_in, b_in
+        return (a, b, c, d), (a_in, b_in)
     n = media.solid_n[w, solid] / media.n[w, medium]
     kappa = media.solid_kappa[w, solid] / media.n[w, medium]
-    a, b, c, d = reflection_elements(cos_in, n, kappa)
+    back = reflection_elements(cos_in, n, kappa)
     a_in, b_in = 0.0, 0.0
     if media.base[w, solid, medium] > 0.0:
         a_in, b_in, _, _ = transmission_elements(cos_in, n, kappa)
-    return a, b, c, d, a_in, b_in
+    return back, (a_in, b_in)
 
 
 @jit(forceinline=True)
@@ -191,7 +193,8 @@ def leave_base(media, w, solid, medium, draw):
     """
     n = media.n[w, medium]
     if media.kappa[w, medium] == 0.0:
-        return n, math.sqrt(draw), max(math.sqrt(1.0 - draw), GRAZING), 1.0
+        sine, cosine = cosine_law(draw)
+        return n, sine, cosine, 1.0
     top2 = media.solid_n[w, solid] * media.solid_n[w, solid]
     open2 = min(n * n, top2)
     tail = media.tail[w, solid, medium]

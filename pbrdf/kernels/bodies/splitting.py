@@ -12,6 +12,7 @@ from pbrdf.kernels.bodies.beams import EVENTS, INDEX, MUELLER, copy_beam
 from pbrdf.kernels.bodies.events import cross, normal_at, set_rate
 from pbrdf.kernels.bodies.interfaces import (
     apply_elements,
+    come_out,
     meet,
     reflect_beam,
     refract_beam,
@@ -29,7 +30,7 @@ from pbrdf.kernels.bodies.media import (
     same_index,
     solid_elements,
 )
-from pbrdf.kernels.paths.random import uniform_pair
+from pbrdf.kernels.paths.random import pair_of
 from pbrdf.kernels.paths.shading import ABSORBED
 
 # Both parts of a beam are followed while the weaker has this share of the ray; a part below
@@ -42,9 +43,7 @@ CROWDED = -9
 
 
 @jit(forceinline=True)
-def meet_interface(
-    world, w, state, top, kind, hit, columns, stream, number, event, energy
-):  # fmt: skip
+def meet_interface(world, w, state, top, kind, hit, columns, draw, energy):
     """Reflect and refract at the surface of a body or film; returns the new top.
 
     Within one medium nothing happens. CROWDED says that the beam is in too many bodies.
@@ -52,25 +51,23 @@ def meet_interface(
     media = world.media
     before = medium_of(world, state, top)
     after = medium_behind(world, state, top, kind, hit)
-    n_x, n_y, n_z = normal_at(world, state, top, kind, hit)
+    normal = normal_at(world, state, top, kind, hit)
     if same_index(media, w, before, after):
         if not cross(world, state, top, kind, hit):
             return CROWDED
-        set_rate(state, top, n_x, n_y, n_z)
+        set_rate(state, top, normal)
         return top
 
     state[top, EVENTS] += 1.0
-    cos_in = meet(state, top, columns, n_x, n_y, n_z)
+    cos_in = meet(state, top, columns, normal)
     index = index_along(media, w, before, state, top)
-    a, b, c, d, a_t, b_t, c_t, d_t, ratio = both_elements(
-        media, w, before, after, index, cos_in
-    )
+    back, through, ratio = both_elements(media, w, before, after, index, cos_in)
     i, q = state[top, MUELLER], state[top, MUELLER + 4]
-    reflected = a * i + b * q
-    refracted = a_t * i + b_t * q
+    reflected = back[0] * i + back[1] * q
+    refracted = through[0] * i + through[1] * q
     if media.absorption[w, after] > 0.0:
         copy_beam(state, top, top + 1)
-        refract_beam(state, top + 1, n_x, n_y, n_z, cos_in, ratio)
+        refract_beam(state, top + 1, normal, cos_in, ratio)
         way = least_way(world, state, top + 1, kind, hit)
         if way * absorption_along(media, w, after, ratio * index) >= world.deep:
             ratio = 0.0
@@ -84,8 +81,8 @@ def meet_interface(
     share = reflected / (reflected + refracted)
     keeps = False
     if not both:
-        draw, _ = uniform_pair(stream, number, event)
-        keeps = draw < share
+        chance, _ = pair_of(draw)
+        keeps = chance < share
     if both or not keeps:
         # The refracted part, on the far side
         further = top + 1 if both else top
@@ -93,38 +90,23 @@ def meet_interface(
             copy_beam(state, top, further)
         if not cross(world, state, further, kind, hit):
             return CROWDED
-        refract_beam(state, further, n_x, n_y, n_z, cos_in, ratio)
+        refract_beam(state, further, normal, cos_in, ratio)
         state[further, INDEX] = ratio * index
-        apply_elements(state, further, columns, a_t, b_t, c_t, d_t)
+        apply_elements(state, further, columns, through)
         if not both:
             scale_columns(state, further, columns, 1.0 / (1.0 - share))
-        set_rate(state, further, n_x, n_y, n_z)
+        set_rate(state, further, normal)
     if both or keeps:
-        reflect_beam(state, top, n_x, n_y, n_z, cos_in)
-        apply_elements(state, top, columns, a, b, c, d)
+        reflect_beam(state, top, normal, cos_in)
+        apply_elements(state, top, columns, back)
         if not both:
             scale_columns(state, top, columns, 1.0 / share)
-        set_rate(state, top, n_x, n_y, n_z)
+        set_rate(state, top, normal)
     return top + 1 if both else top
 
 
 @jit(forceinline=True)
-def come_out(state, top, columns, a_in, b_in, a_out, b_out, base):
-    """Take a beam through the interface to the diffuse base, and out again."""
-    for column in range(columns):
-        inside = base * (
-            a_in * state[top, MUELLER + column] + b_in * state[top, MUELLER + 4 + column]
-        )
-        state[top, MUELLER + column] = a_out * inside
-        state[top, MUELLER + 4 + column] = b_out * inside
-        state[top, MUELLER + 8 + column] = 0.0
-        state[top, MUELLER + 12 + column] = 0.0
-
-
-@jit(forceinline=True)
-def meet_solid(
-    world, w, state, top, kind, solid, hit, columns, stream, number, event, energy
-):  # fmt: skip
+def meet_solid(world, w, state, top, kind, solid, hit, columns, draw, energy):
     """Reflect at something opaque and scatter at the base under it; returns the new top."""
     media = world.media
     arriving = state[top, MUELLER]
@@ -132,29 +114,29 @@ def meet_solid(
         energy[w, ABSORBED] += arriving
         return top - 1
     medium = medium_of(world, state, top)
-    n_x, n_y, n_z = normal_at(world, state, top, kind, hit)
+    normal = normal_at(world, state, top, kind, hit)
     state[top, EVENTS] += 1.0
-    cos_in = meet(state, top, columns, n_x, n_y, n_z)
-    a, b, c, d, a_in, b_in = solid_elements(
+    cos_in = meet(state, top, columns, normal)
+    back, (a_in, b_in) = solid_elements(
         media, w, solid, medium, index_along(media, w, medium, state, top), cos_in
     )
     base = media.base[w, solid, medium]
     scattered = 0.0
     if base > 0.0:
-        draw_a, draw_b = uniform_pair(stream, number, event)
+        draw_a, draw_b = pair_of(draw)
         copy_beam(state, top, top + 1)
         index, sine, cos_out, weight = leave_base(media, w, solid, medium, draw_a)
-        send_out(state, top + 1, n_x, n_y, n_z, sine, cos_out, draw_b)
+        send_out(state, top + 1, normal, sine, cos_out, draw_b)
         state[top + 1, INDEX] = index
-        _, _, _, _, a_out, b_out = solid_elements(media, w, solid, medium, index, cos_out)
+        _, (a_out, b_out) = solid_elements(media, w, solid, medium, index, cos_out)
         come_out(state, top + 1, columns, a_in, b_in, a_out, b_out, base * weight)
-        set_rate(state, top + 1, n_x, n_y, n_z)
+        set_rate(state, top + 1, normal)
         scattered = state[top + 1, MUELLER]
-    apply_elements(state, top, columns, a, b, c, d)
+    apply_elements(state, top, columns, back)
     energy[w, ABSORBED] += arriving - state[top, MUELLER] - scattered
     if state[top, MUELLER] > 0.0:
-        reflect_beam(state, top, n_x, n_y, n_z, cos_in)
-        set_rate(state, top, n_x, n_y, n_z)
+        reflect_beam(state, top, normal, cos_in)
+        set_rate(state, top, normal)
         return top + 1 if scattered > 0.0 else top
     if scattered > 0.0:
         copy_beam(state, top + 1, top)
@@ -180,13 +162,13 @@ def arrives(world, w, state, top, columns, distance, energy):
 
 
 @jit(forceinline=True)
-def survives(state, top, columns, stream, number, event):
+def survives(state, top, columns, draw):
     """Whether a beam goes on; a weak one by chance, at the strength of the threshold."""
     strength = state[top, MUELLER]
     if strength >= WEAK:
         return True
-    _, draw = uniform_pair(stream, number, event)
-    if draw * WEAK >= strength:
+    _, chance = pair_of(draw)
+    if chance * WEAK >= strength:
         return False
     scale_columns(state, top, columns, WEAK / strength)
     return True

@@ -20,9 +20,6 @@ from pbrdf.kernels.bodies.beams import (
     N_INSIDE,
     NOTHING,
     START,
-    SX,
-    SY,
-    SZ,
     X,
     Y,
     Z,
@@ -37,7 +34,12 @@ from pbrdf.kernels.bodies.events import (
     move_beam,
     next_event,
 )
-from pbrdf.kernels.bodies.interfaces import turn_columns
+from pbrdf.kernels.bodies.interfaces import (
+    axis_of_beam,
+    set_axis,
+    turn_columns,
+    way_of_beam,
+)
 from pbrdf.kernels.bodies.media import solid_at
 from pbrdf.kernels.bodies.splitting import (
     CROWDED,
@@ -46,7 +48,8 @@ from pbrdf.kernels.bodies.splitting import (
     meet_solid,
     survives,
 )
-from pbrdf.kernels.paths.ray_bounce import exit_turn
+from pbrdf.kernels.optics.frames import exit_turn
+from pbrdf.kernels.paths.random import Draw
 from pbrdf.kernels.paths.shading import (
     LEAKED,
     N_ESCAPED,
@@ -59,23 +62,20 @@ from pbrdf.kernels.paths.shading import (
     SIDEWAYS,
     TRUNCATED,
 )
-from pbrdf.kernels.terrain.entry import entry_line, first_ray, line_beam, wrap_into
+from pbrdf.kernels.terrain.entry import entry_point, rays_of_line, way_of
 from pbrdf.kernels.terrain.sweep import sweep_line
 
 MAX_STEPS = 10_000_000  # of one ray with all its parts
 
 
 @jit(forceinline=True)
-def deposit(state, top, columns, w, cos_phi_i, sin_phi_i, tally):
+def deposit(state, top, columns, w, beam, tally):
     """Add the matrix of a beam that leaves the scene to its bin."""
-    k_x, k_y, k_z = state[top, KX], state[top, KY], state[top, KZ]
-    c2, s2 = exit_turn(
-        k_x, k_y, k_z, state[top, SX], state[top, SY], state[top, SZ],
-        cos_phi_i, sin_phi_i,
-    )  # fmt: skip
+    k = way_of_beam(state, top)
+    c2, s2 = exit_turn(k, axis_of_beam(state, top), beam.cos_phi, beam.sin_phi)
     turn_columns(state, top, columns, c2, s2)
     i_theta, i_dphi = bin_of_direction(
-        k_x, k_y, k_z, cos_phi_i, sin_phi_i, tally.zenith, tally.azimuth
+        k.x, k.y, k.z, beam.cos_phi, beam.sin_phi, tally.zenith, tally.azimuth
     )
     order = int(min(state[top, EVENTS], tally.flux.shape[1])) - 1
     tally.counts[N_ESCAPED] += 1
@@ -89,10 +89,10 @@ def deposit(state, top, columns, w, cos_phi_i, sin_phi_i, tally):
 
 
 @jit(forceinline=True)
-def end_beam(state, top, kind, columns, w, cos_phi_i, sin_phi_i, tally):
+def end_beam(state, top, kind, columns, w, beam, tally):
     """Book what has become of a beam that goes no further."""
     if kind == OUT and state[top, EVENTS] > 0.0 and state[top, KZ] > 0.0:
-        deposit(state, top, columns, w, cos_phi_i, sin_phi_i, tally)
+        deposit(state, top, columns, w, beam, tally)
     elif kind == ASIDE:
         tally.counts[N_SIDE] += 1
         tally.energy[w, SIDEWAYS] += state[top, MUELLER]
@@ -109,16 +109,11 @@ def end_beam(state, top, kind, columns, w, cos_phi_i, sin_phi_i, tally):
 @jit(forceinline=True)
 def launch_beam(state, x, y, z, beam, columns):
     """Start a beam of unit matrix in the air, of the light that `line_beam` tells."""
-    _, _, sin_t, cos_t, cos_b, sin_b, s_x, s_y, s_z = beam
     state[0, X] = x
     state[0, Y] = y
     state[0, Z] = z
-    state[0, KX] = -sin_t * cos_b
-    state[0, KY] = -sin_t * sin_b
-    state[0, KZ] = -cos_t
-    state[0, SX] = s_x
-    state[0, SY] = s_y
-    state[0, SZ] = s_z
+    state[0, KX], state[0, KY], state[0, KZ] = way_of(beam)
+    set_axis(state, 0, beam.s)
     state[0, START] = FREE
     state[0, FACET] = -1.0
     state[0, EVENTS] = 0.0
@@ -132,42 +127,37 @@ def launch_beam(state, x, y, z, beam, columns):
 
 
 @jit(forceinline=True)
-def follow_beam(
-    world, w, top, kind, stream, number, step, cos_phi, sin_phi, max_events, columns, room,
-    tally,
-):  # fmt: skip
-    """Take the beam at the top of the stack to its next event; returns the new top."""
+def follow_beam(world, w, top, kind, draw, beam, max_events, columns, room, tally):
+    """Take the beam at the top of the stack to its next event; returns the new top.
+
+    `draw` names the first of two pairs of random numbers; `beam` is the light as it came.
+    """
     state, hit = room.state, room.hit
     if kind < OUT and not arrives(world, w, state, top, columns, hit[HIT_T], tally.energy):
         return top - 1
     if kind >= OUT or state[top, EVENTS] >= max_events:
-        end_beam(state, top, kind, columns, w, cos_phi, sin_phi, tally)
+        end_beam(state, top, kind, columns, w, beam, tally)
         return top - 1
 
     move_beam(world, state, top, kind, hit)
     solid = solid_at(world, w, state, top, kind, hit)
     if solid >= 0:
         new = meet_solid(
-            world, w, state, top, kind, solid, hit, columns, stream, number, 2 * step,
-            tally.energy,
-        )  # fmt: skip
+            world, w, state, top, kind, solid, hit, columns, draw, tally.energy
+        )
     else:
-        new = meet_interface(
-            world, w, state, top, kind, hit, columns, stream, number, 2 * step,
-            tally.energy,
-        )  # fmt: skip
+        new = meet_interface(world, w, state, top, kind, hit, columns, draw, tally.energy)
         if new == CROWDED:
-            end_beam(state, top, ASTRAY, columns, w, cos_phi, sin_phi, tally)
+            end_beam(state, top, ASTRAY, columns, w, beam, tally)
             return top - 1
-    if new >= 0 and not survives(state, new, columns, stream, number, 2 * step + 1):
+    later = Draw(draw.stream, draw.number, draw.event + 1)
+    if new >= 0 and not survives(state, new, columns, later):
         return new - 1
     return new
 
 
 @jit(forceinline=True)
-def trace_beams(
-    world, w, number, ray, source, cos_phi, sin_phi, max_events, columns, room, tally
-):  # fmt: skip
+def trace_beams(world, w, number, ray, stream, beam, max_events, columns, room, tally):
     """Follow one ray of a line and all its parts until their light has left or is lost."""
     swept = room.meetings.size > 0
     top = 0
@@ -177,13 +167,11 @@ def trace_beams(
             kind = first_event(world, room.state, room.meetings[ray], room.hit)
         else:
             kind = next_event(world, room.state, top, room.hit)
-        top = follow_beam(
-            world, w, top, kind, source.stream, number, step, cos_phi, sin_phi, max_events,
-            columns, room, tally,
-        )  # fmt: skip
+        draw = Draw(stream, number, 2 * step)
+        top = follow_beam(world, w, top, kind, draw, beam, max_events, columns, room, tally)
         step += 1
         if step == MAX_STEPS and top >= 0:
-            end_beam(room.state, top, ASTRAY, columns, w, cos_phi, sin_phi, tally)
+            end_beam(room.state, top, ASTRAY, columns, w, beam, tally)
             break
     tally.counts[N_SEGMENTS] += step
 
@@ -196,27 +184,21 @@ def trace_among_bodies(world, source, z_start, max_events, columns, room, tally)
     `pbrdf.kernels.paths.transport.trace_batch`.
     """
     terrain = world.terrain
-    launch = source.launch
     for line in range(source.n_lines):
-        start_x, start_y, speed_x, speed_y, length, _, offset, cos_phi, sin_phi = (
-            entry_line(line, source, terrain.pitch_x, terrain.pitch_y)
+        beam, first, rays, points = rays_of_line(
+            line, source, terrain.pitch_x, terrain.pitch_y
         )
-        beam = line_beam(line, source)
         if room.meetings.size > 0:
             lift = world.film.height if world.film.kind == CONFORMAL else 0.0
             sweep_line(terrain, line, source, z_start - lift, room.meetings)
-        first = first_ray(line, source)
-        rays = first_ray(line + 1, source) - first
         for ray in range(rays):
-            s = length * ((ray + offset) / rays)
-            x = wrap_into(start_x + speed_x * s, launch[0], launch[2])
-            y = wrap_into(start_y + speed_y * s, launch[1], launch[3])
+            x, y = entry_point(points, ray, rays, source.launch)
             for w in range(tally.energy.shape[0]):
                 launch_beam(
                     room.state, x * terrain.pitch_x, y * terrain.pitch_y, z_start,
                     beam, columns,
                 )  # fmt: skip
                 trace_beams(
-                    world, w, first + ray, ray, source, cos_phi, sin_phi, max_events,
-                    columns, room, tally,
+                    world, w, first + ray, ray, source.stream, beam, max_events, columns,
+                    room, tally,
                 )  # fmt: skip

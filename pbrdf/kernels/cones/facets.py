@@ -14,7 +14,11 @@ import numpy as np
 from pbrdf.kernels import jit
 from pbrdf.kernels.cones.lens import leave, lens_direction, lens_flux
 from pbrdf.kernels.cones.matrix import facet_mueller
+from pbrdf.kernels.optics.light import mirror_image
+from pbrdf.kernels.optics.vectors import dot, opposite
+from pbrdf.kernels.paths.ground import Place
 from pbrdf.kernels.paths.random import uniform_pair
+from pbrdf.kernels.paths.ray_bounce import normal_of_slopes
 from pbrdf.kernels.terrain.heightfield import (
     ESCAPED,
     FACET_LOW,
@@ -32,6 +36,10 @@ FLUX, UNKNOWN_FLUX, N_SHOWN = 0, 1, 2
 # Counts: facets that join the cones, points tried on them, points seen from both sides,
 # points whose rays left a finite map sideways
 N_FACETS, N_POINTS, N_SEEN, N_ASIDE, N_FACET_COUNTS = 0, 1, 2, 3, 4
+# What is added up: `shown` (materials, N_SHOWN), flux of single reflections without the
+# mirror's matrix; `matrices` (wavelengths, stokes, stokes), flux with each path's own, of
+# no size where that is not asked; counts (N_FACET_COUNTS,); and room for a matrix (4, 4)
+Sums = namedtuple("Sums", "shown matrices counts mueller")
 
 
 @jit(allocates=False)
@@ -94,15 +102,15 @@ def joining_normals(cones):
     The source mirrored by n lies within the sum of the half-angles of the detector:
     2 (n.d)(n.i) - (d.i) |n|^2 >= cos(sum) |n|^2.
     """
-    cos_sum = cones.cos_d * cones.cos_i - cones.sin_d * cones.sin_i
-    share = cones.d_x * cones.i_x + cones.d_y * cones.i_y + cones.d_z * cones.i_z + cos_sum
+    d, i = cones.d, cones.i
+    share = dot(d, i) + (cones.cos_d * cones.cos_i - cones.sin_d * cones.sin_i)
     return (
-        2.0 * cones.d_x * cones.i_x - share,
-        2.0 * cones.d_y * cones.i_y - share,
-        2.0 * cones.d_z * cones.i_z - share,
-        cones.d_x * cones.i_y + cones.d_y * cones.i_x,
-        cones.d_x * cones.i_z + cones.d_z * cones.i_x,
-        cones.d_y * cones.i_z + cones.d_z * cones.i_y,
+        2.0 * d.x * i.x - share,
+        2.0 * d.y * i.y - share,
+        2.0 * d.z * i.z - share,
+        d.x * i.y + d.y * i.x,
+        d.x * i.z + d.z * i.x,
+        d.y * i.z + d.z * i.y,
     )
 
 
@@ -130,67 +138,114 @@ def cell_range(low, high, first, per_slope, size):
     return int(max(from_cell, 0.0)), int(min(to_cell, size - 1.0)) + 1
 
 
+@jit(forceinline=True)
+def cells_of_conic(table, size, form):
+    """Cells (from x, to x, from y, to y) of the grid of slopes that hold joining facets."""
+    b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = form
+    # A normal (x, y, 1) has the slopes (-x, -y)
+    low, high = conic_extent(b_xx, b_yy, b_zz, b_xy, b_xz, b_yz)
+    from_x, to_x = cell_range(-high, -low, table.low_x, table.per_x, size)
+    low, high = conic_extent(b_yy, b_xx, b_zz, b_xy, b_yz, b_xz)
+    from_y, to_y = cell_range(-high, -low, table.low_y, table.per_y, size)
+    return from_x, to_x, from_y, to_y
+
+
+@jit(forceinline=True)
+def value_of_form(form, slope_x, slope_y):
+    """Value of the quadratic form of the normals for a facet of these slopes."""
+    b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = form
+    return (
+        b_zz
+        + (b_xx * slope_x + 2.0 * b_xy * slope_y - 2.0 * b_xz) * slope_x
+        + (b_yy * slope_y - 2.0 * b_yz) * slope_y
+    )
+
+
+@jit(forceinline=True)
+def flux_of_facet(normal, cones):
+    """Flux through a facet per area, and the source as the facet shows it."""
+    to_d, to_i = dot(normal, cones.d), dot(normal, cones.i)
+    image = mirror_image(opposite(cones.i), normal, to_i)
+    flux = 0.0
+    if to_d > 0.0 and to_i > 0.0:
+        flux = lens_flux(
+            dot(image, cones.d), to_d, to_i,
+            cones.cos_d, cones.sin_d, cones.cos_i, cones.sin_i,
+        )  # fmt: skip
+    return flux, image
+
+
+@jit(forceinline=True)
+def show_point(terrain, mesh, place, facet, cones, stream, name, optics, sums):
+    """Add the light of a facet if a point of it is seen from the detector and the source.
+
+    facet       its normal, the source as it shows it, its material, and its flux
+    """
+    normal, image, m, flux = facet
+    shown, matrices, counts, mueller = sums
+    k = lens_direction(cones.d, image, cones.half_d, cones.half_i, normal, stream, name)
+    cosine = dot(normal, k)
+    counts[N_POINTS] += 1
+    if cosine <= 0.0:
+        return
+    # Seen from the detector, and through the mirror from the source? (Only the walk over a
+    # height field asks how fast a ray rises from its facet)
+    rate = cosine / normal.z
+    fate, _ = leave(terrain, mesh, place, k, rate)
+    if fate == ESCAPED:
+        fate, _ = leave(
+            terrain, mesh, place, mirror_image(opposite(k), normal, cosine), rate
+        )
+    if fate == SIDE:
+        counts[N_ASIDE] += 1
+        shown[m, UNKNOWN_FLUX] += flux
+    elif fate == ESCAPED:
+        counts[N_SEEN] += 1
+        shown[m, FLUX] += flux
+        n_stokes = matrices.shape[1]
+        for w in range(matrices.shape[0]):
+            facet_mueller(cones, k, normal, optics, w, m, n_stokes, mueller)
+            for row in range(n_stokes):
+                for column in range(n_stokes):
+                    matrices[w, row, column] += flux * mueller[row, column]
+
+
 @jit(allocates=False)
-def show_facets(
-    terrain, table, size, inside, cones, points, most, stream, optics, shown, matrices,
-    counts, mueller,
-):  # fmt: skip
+def show_facets(terrain, table, size, inside, cones, points, most, stream, optics, sums):
     """Add up the facets that join the two cones.
 
     points, most    points a facet, and about the most in all: of more, some facets are
                     drawn at random and stand for the others
-    shown       (materials, N_SHOWN) flux of single reflections without the mirror's matrix
-    matrices    (wavelengths, stokes, stokes) flux with each path's own; none if of no size
+    sums            `Sums`
 
     Flux is the integral of the cosine over the lens of directions, a facet counting by its
     share of the horizontal area and a hidden point as none. Divided by the projected solid
     angles of both cones it is 1/sr.
     """
     labels = terrain.labels
-    b_xx, b_yy, b_zz, b_xy, b_xz, b_yz = joining_normals(cones)
-    # A normal (x, y, 1) has the slopes (-x, -y)
-    low, high = conic_extent(b_xx, b_yy, b_zz, b_xy, b_xz, b_yz)
-    from_x, to_x = cell_range(-high, -low, table.low_x, table.per_x, size)
-    low, high = conic_extent(b_yy, b_xx, b_zz, b_xy, b_yz, b_xz)
-    from_y, to_y = cell_range(-high, -low, table.low_y, table.per_y, size)
+    form = joining_normals(cones)
+    from_x, to_x, from_y, to_y = cells_of_conic(table, size, form)
     near = 0
     for a in range(from_x, to_x):
         near += table.start[a * size + to_y] - table.start[a * size + from_y]
     chance = min(1.0, most / max(near * points, 1))
     share = 1.0 / table.facets.size / points / chance
     for a in range(from_x, to_x):
-        for place in range(table.start[a * size + from_y], table.start[a * size + to_y]):
-            number = table.facets[place]
+        for entry in range(table.start[a * size + from_y], table.start[a * size + to_y]):
+            number = table.facets[entry]
             facet = number % 2
             i = number // 2 // table.rows + inside[0]
             j = number // 2 % table.rows + inside[2]
             slope_x, slope_y = facet_slopes(terrain, i, j, facet)
-            form = (
-                b_zz + (b_xx * slope_x + 2.0 * b_xy * slope_y - 2.0 * b_xz) * slope_x
-                + (b_yy * slope_y - 2.0 * b_yz) * slope_y
-            )  # fmt: skip
-            if form <= 0.0:
+            if value_of_form(form, slope_x, slope_y) <= 0.0:
                 continue
-            n_z = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
-            n_x = -slope_x * n_z
-            n_y = -slope_y * n_z
-            to_d = n_x * cones.d_x + n_y * cones.d_y + n_z * cones.d_z
-            to_i = n_x * cones.i_x + n_y * cones.i_y + n_z * cones.i_z
-            if to_d <= 0.0 or to_i <= 0.0:
-                continue
-            # The source as the facet shows it
-            m_x = 2.0 * to_i * n_x - cones.i_x
-            m_y = 2.0 * to_i * n_y - cones.i_y
-            m_z = 2.0 * to_i * n_z - cones.i_z
-            flux = lens_flux(
-                m_x * cones.d_x + m_y * cones.d_y + m_z * cones.d_z, to_d, to_i,
-                cones.cos_d, cones.sin_d, cones.cos_i, cones.sin_i,
-            )  # fmt: skip
-            flux *= share / n_z
+            normal, _ = normal_of_slopes(slope_x, slope_y)
+            flux, image = flux_of_facet(normal, cones)
+            flux *= share / normal.z
             draw, _ = uniform_pair(stream, 2 * number * points, 1)
             if flux <= 0.0 or draw >= chance:
                 continue
-            counts[N_FACETS] += 1
+            sums.counts[N_FACETS] += 1
             m = labels[i, j] if labels.size > 0 else 0
             z00, z10, z01, z11 = corner_heights(terrain.heights, i, j, terrain.periodic)
             for point in range(points):
@@ -199,36 +254,7 @@ def show_facets(
                 if (u > v) != (facet == FACET_LOW):
                     u, v = v, u
                 z = plane_height(z00, z10, z01, z11, facet, u, v)
-                k_x, k_y, k_z = lens_direction(
-                    cones.d_x, cones.d_y, cones.d_z, m_x, m_y, m_z,
-                    cones.half_d, cones.half_i, n_x, n_y, n_z, stream, 2 * name + 1,
+                show_point(
+                    terrain, None, Place(i, j, facet, u, v, z), (normal, image, m, flux),
+                    cones, stream, 2 * name + 1, optics, sums,
                 )  # fmt: skip
-                cosine = n_x * k_x + n_y * k_y + n_z * k_z
-                counts[N_POINTS] += 1
-                if cosine <= 0.0:
-                    continue
-                # Seen from the detector, and through the mirror from the source?
-                fate = leave(
-                    terrain, None, i, j, facet, u, v, z, k_x, k_y, k_z, cosine / n_z
-                )[0]
-                if fate == ESCAPED:
-                    fate = leave(
-                        terrain, None, i, j, facet, u, v, z,
-                        2.0 * cosine * n_x - k_x, 2.0 * cosine * n_y - k_y,
-                        2.0 * cosine * n_z - k_z, cosine / n_z,
-                    )[0]  # fmt: skip
-                if fate == SIDE:
-                    counts[N_ASIDE] += 1
-                    shown[m, UNKNOWN_FLUX] += flux
-                elif fate == ESCAPED:
-                    counts[N_SEEN] += 1
-                    shown[m, FLUX] += flux
-                    for w in range(matrices.shape[0]):
-                        n_stokes = matrices.shape[1]
-                        facet_mueller(
-                            cones, k_x, k_y, k_z, n_x, n_y, n_z, optics, w, m, n_stokes,
-                            mueller,
-                        )  # fmt: skip
-                        for row in range(n_stokes):
-                            for column in range(n_stokes):
-                                matrices[w, row, column] += flux * mueller[row, column]

@@ -10,10 +10,10 @@ import math
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.optics.frames import PARALLEL
+from pbrdf.kernels.optics.vectors import Vec, combined, cross, dot, scaled
+from pbrdf.kernels.paths.ground import next_facet
 from pbrdf.kernels.paths.random import uniform_pair
-from pbrdf.kernels.paths.transport import next_facet
 
-TWO_PI = 2.0 * math.pi
 # At least two thirds of the box about a lens are lens
 MAX_TRIES = 200
 
@@ -57,29 +57,14 @@ def lens_flux(cos_between, along_1, along_2, cos_1, sin_1, cos_2, sin_2):
     )
 
 
-@jit(inline="always")
-def carried_axis(a_x, a_y, a_z, s_x, s_y, k_x, k_y, k_z):
-    """Horizontal axis s of a beam along a, carried to the direction k on the shortest way.
-
-    So the polarisers of an instrument serve every ray of its cone, also about the zenith,
-    where the meridian frame spins. The same for the beams along -a and -k.
-    """
-    share = (s_x * k_x + s_y * k_y) / (1.0 + a_x * k_x + a_y * k_y + a_z * k_z)
-    return s_x - share * (a_x + k_x), s_y - share * (a_y + k_y), -share * (a_z + k_z)
-
-
-@jit(inline="always")
-def cap_direction(a_x, a_y, a_z, s_x, s_y, cos_half, draw_a, draw_b):
-    """Direction spread evenly over a cap about a with the horizontal unit vector s."""
+@jit(forceinline=True)
+def cap_direction(a, s, cos_half, draw_a, draw_b):
+    """Direction spread evenly over a cap about a with the unit vector s across it."""
     lift = draw_a * (1.0 - cos_half)
     sine = math.sqrt(lift * (2.0 - lift))
-    c = sine * math.cos(TWO_PI * draw_b)
-    d = sine * math.sin(TWO_PI * draw_b)
-    # The third axis is a x s
-    return (
-        (1.0 - lift) * a_x + c * s_x - d * a_z * s_y,
-        (1.0 - lift) * a_y + c * s_y + d * a_z * s_x,
-        (1.0 - lift) * a_z + d * (a_x * s_y - a_y * s_x),
+    azimuth = math.tau * draw_b
+    return combined(
+        1.0 - lift, a, sine * math.cos(azimuth), s, sine * math.sin(azimuth), cross(a, s)
     )
 
 
@@ -106,36 +91,33 @@ def lens_box(between, half_1, half_2):
     return radius_1, center, radius_2, left, right, half
 
 
-@jit
-def lens_direction(
-    a_x, a_y, a_z, b_x, b_y, b_z, half_1, half_2, n_x, n_y, n_z, stream, name
-):  # fmt: skip
-    """Direction in the lens of the caps about a and b, spread as its cosine to n.
-
-    Directions below the plane across n are left out.
-    """
-    c_x = a_y * b_z - a_z * b_y
-    c_y = a_z * b_x - a_x * b_z
-    c_z = a_x * b_y - a_y * b_x
-    sine = math.sqrt(c_x * c_x + c_y * c_y + c_z * c_z)
-    between = math.atan2(sine, a_x * b_x + a_y * b_y + a_z * b_z)
+@jit(forceinline=True)
+def axes_of_pair(a, b):
+    """Axes u towards b and v across both of two caps about a and b, and their distance."""
+    c = cross(a, b)
+    sine = math.sqrt(dot(c, c))
+    between = math.atan2(sine, dot(a, b))
     if sine * sine > PARALLEL:
-        # v across both axes, u = v x a towards b
-        v_x, v_y, v_z = c_x / sine, c_y / sine, c_z / sine
+        v = Vec(c.x / sine, c.y / sine, c.z / sine)
     else:
         # Both about one axis: any direction across it
-        c_x, c_y, c_z = (1.0 - a_x * a_x, -a_x * a_y, -a_x * a_z)
-        if abs(a_x) > 0.7:
-            c_x, c_y, c_z = (-a_y * a_x, 1.0 - a_y * a_y, -a_y * a_z)
-        scale = 1.0 / math.sqrt(c_x * c_x + c_y * c_y + c_z * c_z)
-        v_x, v_y, v_z = c_x * scale, c_y * scale, c_z * scale
-    u_x = v_y * a_z - v_z * a_y
-    u_y = v_z * a_x - v_x * a_z
-    u_z = v_x * a_y - v_y * a_x
+        c = Vec(1.0 - a.x * a.x, -a.x * a.y, -a.x * a.z)
+        if abs(a.x) > 0.7:
+            c = Vec(-a.y * a.x, 1.0 - a.y * a.y, -a.y * a.z)
+        v = scaled(c, 1.0 / math.sqrt(dot(c, c)))
+    return cross(v, a), v, between
 
+
+@jit
+def lens_direction(a, b, half_1, half_2, normal, stream, name):
+    """Direction in the lens of the caps about a and b, spread as its cosine to a normal.
+
+    Directions below the plane across the normal are left out.
+    """
+    u, v, between = axes_of_pair(a, b)
     radius_1, center, radius_2, left, right, half = lens_box(between, half_1, half_2)
-    highest = min(1.0, n_x * a_x + n_y * a_y + n_z * a_z + math.sin(half_1))
-    k_x, k_y, k_z = a_x, a_y, a_z
+    highest = min(1.0, dot(normal, a) + math.sin(half_1))
+    k = a
     for attempt in range(MAX_TRIES):
         draw_x, draw_y = uniform_pair(stream, name, 2 * attempt)
         x = left + (right - left) * draw_x
@@ -145,18 +127,15 @@ def lens_direction(
             continue
         quarter = 0.25 * (x * x + y * y)
         scale = 1.0 / (1.0 + quarter)
-        k_x = ((1.0 - quarter) * a_x + x * u_x + y * v_x) * scale
-        k_y = ((1.0 - quarter) * a_y + x * u_y + y * v_y) * scale
-        k_z = ((1.0 - quarter) * a_z + x * u_z + y * v_z) * scale
+        k = scaled(combined(1.0 - quarter, a, x, u, y, v), scale)
         # As the solid angle of the plane's element, and as the cosine
         chance, _ = uniform_pair(stream, name, 2 * attempt + 1)
-        cosine = n_x * k_x + n_y * k_y + n_z * k_z
-        if chance * highest < scale * scale * cosine:
+        if chance * highest < scale * scale * dot(normal, k):
             break
-    return k_x, k_y, k_z
+    return k
 
 
 @jit(allocates=False)
-def leave(terrain, mesh, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate):
+def leave(terrain, mesh, place, k, leave_rate):
     """`next_facet` as a function of its own: rays are sent from several places."""
-    return next_facet(terrain, None, mesh, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate)
+    return next_facet(terrain, None, mesh, place, k, leave_rate)

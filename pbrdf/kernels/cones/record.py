@@ -7,26 +7,9 @@ polariser at the target.
 from collections import namedtuple
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.cones.lens import carried_axis
-from pbrdf.kernels.optics.frames import turn_frame
-from pbrdf.kernels.optics.fresnel import reflection_elements, transmission_elements
-from pbrdf.kernels.paths.shading import (
-    COS_IN,
-    COS_OUT,
-    LABEL,
-    LEAKED,
-    N_BELOW,
-    N_SIDE,
-    N_TRUNCATED,
-    SIDEWAYS,
-    SPECULAR,
-    TRANSMITTED,
-    TRUNCATED,
-    TURN_C,
-    TURN_S,
-    reflect_column,
-    scatter_column,
-)
+from pbrdf.kernels.optics.frames import carried_axis, turn_frame
+from pbrdf.kernels.optics.vectors import Vec
+from pbrdf.kernels.paths.shading import TURN_C, TURN_S, lost_energy, reflect_often
 
 # What is caught: flux (3, targets, bounces, wavelengths, stokes, stokes) of all paths, of
 # glints, and the variance of glints that near misses foretell; paths caught (2, targets,
@@ -34,114 +17,86 @@ from pbrdf.kernels.paths.shading import (
 # (4, 4)
 Catch = namedtuple("Catch", "flux caught energy counts mueller")
 ALL, GLINTS, FORETOLD = 0, 1, 2
+# Columns of a target: sine and cosine of zenith, of azimuth from the bundle, of half-angle,
+# cosine of the angle within which a path was near, and the mean square of what it adds then
+T_SIN, T_COS, T_COS_PHI, T_SIN_PHI, T_COS_HALF, T_SIN_HALF = 0, 1, 2, 3, 4, 5
+T_COS_NEAR, T_CHANCE, N_TARGET = 6, 7, 8
 # Columns of a target's axes over one line of bundles: direction, horizontal s axis
 A_X, A_Y, A_Z, A_SX, A_SY, N_AXES = 0, 1, 2, 3, 4, 5
+# What bundles look for: targets (n, N_TARGET) and axes (n, N_AXES); record (bounces + 1, 1,
+# N_RECORD) and hits (bounces, N_HIT), room to work in; optics, the `Rule`, and the `Catch`
+Scan = namedtuple("Scan", "targets axes record hits optics rule catch")
 
 
-@jit(allocates=False)
-def chain_mueller(record, bounces, w, optics, n_stokes, mueller):
-    """Mueller matrix of a recorded path, all its columns side by side."""
-    for row in range(4):
-        for column in range(n_stokes):
-            mueller[row, column] = 1.0 if row == column else 0.0
-    for step in range(bounces + 1):
-        # Into the frame of the facet, or after the last bounce of the instrument
-        c2 = record[step, 0, TURN_C]
-        s2 = record[step, 0, TURN_S]
-        for column in range(n_stokes):
-            q = mueller[1, column]
-            u = mueller[2, column]
-            mueller[1, column] = c2 * q + s2 * u
-            mueller[2, column] = c2 * u - s2 * q
-        if step == bounces:
-            break
-        cos_in = record[step, 0, COS_IN]
-        cos_out = record[step, 0, COS_OUT]
-        m = int(record[step, 0, LABEL])
-        n = optics.n[w, m]
-        kappa = optics.kappa[w, m]
-        if cos_out == SPECULAR:
-            a, b, c, d = reflection_elements(cos_in, n, kappa)
-            for column in range(n_stokes):
-                reflect_column(a, b, c, d, column, mueller)
-        else:
-            a_in, b_in, _, _ = transmission_elements(cos_in, n, kappa)
-            a_out, b_out, _, _ = transmission_elements(cos_out, n, kappa)
-            strength = optics.base[w, m]
-            for column in range(n_stokes):
-                scatter_column(strength, a_in, b_in, a_out, b_out, column, mueller)
+@jit(forceinline=True)
+def axis_of_target(scan, target):
+    """Direction of a target and its horizontal s axis."""
+    axes = scan.axes
+    return (
+        Vec(axes[target, A_X], axes[target, A_Y], axes[target, A_Z]),
+        Vec(axes[target, A_SX], axes[target, A_SY], 0.0),
+    )
 
 
-@jit(inline="always")
-def end_path(target, axes, record, bounces, k_x, k_y, k_z, s_x, s_y, s_z):
+@jit(forceinline=True)
+def end_path(scan, target, bounces, k, s):
     """Turn the frame of a path that leaves along k to that of the polariser of a target."""
-    t_x, t_y, t_z = carried_axis(
-        axes[target, A_X], axes[target, A_Y], axes[target, A_Z],
-        axes[target, A_SX], axes[target, A_SY], k_x, k_y, k_z,
-    )  # fmt: skip
+    axis, axis_s = axis_of_target(scan, target)
+    record = scan.record
     record[bounces, 0, TURN_C], record[bounces, 0, TURN_S] = turn_frame(
-        k_x, k_y, k_z, s_x, s_y, s_z, t_x, t_y, t_z
+        k, s, carried_axis(axis, axis_s, k)
     )
 
 
 @jit(allocates=False)
-def catch_path(
-    weight, target, axes, record, bounces, k_x, k_y, k_z, s_x, s_y, s_z, optics, catch
-):  # fmt: skip
+def catch_path(weight, target, bounces, k, s, scan):
     """Add a path that leaves along k, in the frame of the polariser of a target."""
-    end_path(target, axes, record, bounces, k_x, k_y, k_z, s_x, s_y, s_z)
-    order = min(bounces, catch.flux.shape[2]) - 1
+    end_path(scan, target, bounces, k, s)
+    catch, optics = scan.catch, scan.optics
+    flux, mueller = catch.flux, catch.mueller
+    order = min(bounces, flux.shape[2]) - 1
     catch.caught[ALL, target, order] += 1
-    for w in range(catch.flux.shape[3]):
-        chain_mueller(record, bounces, w, optics, optics.n_stokes, catch.mueller)
+    for w in range(flux.shape[3]):
+        reflect_often(scan.record, 0, bounces, w, optics, optics.n_stokes, mueller)
         for row in range(optics.n_stokes):
             for column in range(optics.n_stokes):
-                catch.flux[ALL, target, order, w, row, column] += (
-                    weight * catch.mueller[row, column]
-                )
+                flux[ALL, target, order, w, row, column] += weight * mueller[row, column]
 
 
 @jit(allocates=False)
-def catch_glint(
-    weight, share, chance, target, axes, record, bounces, k_x, k_y, k_z, s_x, s_y, s_z,
-    optics, catch,
-):  # fmt: skip
+def catch_glint(weight, share, target, bounces, k, s, scan):
     """Add a path that may have met the target by luck, and what others like it might add.
 
     share       part of the path's weight that the target gets
-    chance      mean of its square over all places where the path might have passed as near
     """
-    end_path(target, axes, record, bounces, k_x, k_y, k_z, s_x, s_y, s_z)
-    order = min(bounces, catch.flux.shape[2]) - 1
+    end_path(scan, target, bounces, k, s)
+    catch, optics = scan.catch, scan.optics
+    flux, mueller = catch.flux, catch.mueller
+    order = min(bounces, flux.shape[2]) - 1
+    # Mean of its square over all places where the path might have passed as near
+    chance = scan.targets[target, T_CHANCE]
     if share > 0.0:
         catch.caught[ALL, target, order] += 1
         catch.caught[GLINTS, target, order] += 1
-    for w in range(catch.flux.shape[3]):
-        chain_mueller(record, bounces, w, optics, optics.n_stokes, catch.mueller)
+    for w in range(flux.shape[3]):
+        reflect_often(scan.record, 0, bounces, w, optics, optics.n_stokes, mueller)
         for row in range(optics.n_stokes):
             for column in range(optics.n_stokes):
-                light = weight * catch.mueller[row, column]
-                catch.flux[FORETOLD, target, order, w, row, column] += (
-                    chance * light * light
-                )
+                light = weight * mueller[row, column]
+                flux[FORETOLD, target, order, w, row, column] += chance * light * light
                 light *= share
-                catch.flux[ALL, target, order, w, row, column] += light
-                catch.flux[GLINTS, target, order, w, row, column] += light
+                flux[ALL, target, order, w, row, column] += light
+                flux[GLINTS, target, order, w, row, column] += light
 
 
 @jit(allocates=False)
-def lose_path(weight, end, record, bounces, optics, catch):
+def lose_path(weight, end, bounces, scan):
     """Count a path that is not followed to its end, and the unpolarised light on it."""
+    record, catch = scan.record, scan.catch
     catch.counts[end] += 1
-    lost = LEAKED
-    if end == N_TRUNCATED:
-        lost = TRUNCATED
-    elif end == N_SIDE:
-        lost = SIDEWAYS
-    elif end == N_BELOW:
-        lost = TRANSMITTED
+    lost = lost_energy(end)
     for w in range(catch.energy.shape[0]):
         record[bounces, 0, TURN_C] = 1.0
         record[bounces, 0, TURN_S] = 0.0
-        chain_mueller(record, bounces, w, optics, 1, catch.mueller)
+        reflect_often(record, 0, bounces, w, scan.optics, 1, catch.mueller)
         catch.energy[w, lost] += weight * catch.mueller[0, 0]

@@ -164,15 +164,3 @@ def pose_query(mesh, face, x, y, z, k_x, k_y, k_z, near):
     query[Q_FACE] = -1.0
     query[Q_IMAGE] = 0.0
     query[Q_BACK] = math.inf
-
-
-@jit(forceinline=True)
-def across_of(k_x, k_y, k_z):
-    """Two unit vectors across a unit vector (Duff et al. 2017)."""
-    sign = 1.0 if k_z >= 0.0 else -1.0
-    share = -1.0 / (sign + k_z)
-    mixed = k_x * k_y * share
-    return (
-        1.0 + sign * k_x * k_x * share, sign * mixed, -sign * k_x,
-        mixed, sign + k_y * k_y * share, -k_y,
-    )  # fmt: skip

@@ -26,9 +26,9 @@ from pbrdf.kernels.meshes.search import (
     Q_FACE,
     Q_IMAGE,
     Q_TIME,
-    across_of,
     pose_query,
 )
+from pbrdf.kernels.optics.vectors import Vec, axes_across
 from pbrdf.kernels.terrain.embree import (
     ALL,
     DIRECTION,
@@ -114,7 +114,7 @@ def is_delicate(mesh, face, x, y, z, k_x, k_y, k_z, before):
         before * k_x + lift * n_x, before * k_y + lift * n_y, before * k_z + lift * n_z,
     ):  # fmt: skip
         return True
-    a_x, a_y, a_z, b_x, b_y, b_z = across_of(n_x, n_y, n_z)
+    (a_x, a_y, a_z), (b_x, b_y, b_z) = axes_across(Vec(n_x, n_y, n_z))
     x += lift * n_x
     y += lift * n_y
     z += lift * n_z
@@ -138,7 +138,7 @@ def search(mesh, face, x, y, z, k_x, k_y, k_z, t_end, delicate):
     """
     query, lift = mesh.query, mesh.frame.lift
     mesh.searches[0] += 1
-    a_x, a_y, a_z, b_x, b_y, b_z = across_of(k_x, k_y, k_z)
+    (a_x, a_y, a_z), (b_x, b_y, b_z) = axes_across(Vec(k_x, k_y, k_z))
     back = BEHIND * lift
     for attempt in range(delicate, 2):
         # Where two facets cross, float32 may have taken the one behind the other: the ray

@@ -8,8 +8,8 @@ from collections import namedtuple
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.bins.binning import exact_bin, rough_place
-from pbrdf.kernels.optics.frames import turn_frame
-from pbrdf.kernels.paths.ray_bounce import exit_turn, mirror, new_axis
+from pbrdf.kernels.optics.frames import exit_turn
+from pbrdf.kernels.paths.ray_bounce import bounce_at, normal_of_slopes
 from pbrdf.kernels.paths.shading import (
     ABSORBED,
     COS_IN,
@@ -23,6 +23,7 @@ from pbrdf.kernels.paths.shading import (
     tally_path,
 )
 from pbrdf.kernels.paths.spectra import gather_path
+from pbrdf.kernels.terrain.entry import way_of
 from pbrdf.kernels.terrain.heightfield import corner_heights, steps_of
 from pbrdf.kernels.terrain.sweep import F_FACET, F_I, F_J
 
@@ -55,28 +56,22 @@ def mirror_line(beam, rays, slopes, n_theta, n_dphi, mirrored):
 
     The array is flat so that the compiler sees that rays do not touch each other.
     """
-    cos_phi, sin_phi, sin_t, cos_t, cos_b, sin_b, s_x, s_y, s_z = beam
-    k_x = -sin_t * cos_b
-    k_y = -sin_t * sin_b
-    k_z = -cos_t
+    k = way_of(beam)
     for ray in range(rays):
-        r_x, r_y, r_z, w_x, w_y, w_z, _, cos_beta = mirror(
-            k_x, k_y, k_z, slopes[0, ray], slopes[1, ray]
-        )
-        in_c, in_s = turn_frame(k_x, k_y, k_z, s_x, s_y, s_z, w_x, w_y, w_z)
-        w_x, w_y, w_z = new_axis(s_x, s_y, s_z, w_x, w_y, w_z)
-        out_c, out_s = exit_turn(r_x, r_y, r_z, w_x, w_y, w_z, cos_phi, sin_phi)
+        normal, _ = normal_of_slopes(slopes[0, ray], slopes[1, ray])
+        r, w, cos_beta, (in_c, in_s) = bounce_at(k, beam.s, normal)
+        out_c, out_s = exit_turn(r, w, beam.cos_phi, beam.sin_phi)
         at = ray * N_MIRRORED
-        mirrored[at + M_X] = r_x
-        mirrored[at + M_Y] = r_y
-        mirrored[at + M_Z] = r_z
+        mirrored[at + M_X] = r.x
+        mirrored[at + M_Y] = r.y
+        mirrored[at + M_Z] = r.z
         mirrored[at + M_COS] = cos_beta
         mirrored[at + M_IN_C] = in_c
         mirrored[at + M_IN_S] = in_s
         mirrored[at + M_OUT_C] = out_c
         mirrored[at + M_OUT_S] = out_s
         mirrored[at + M_THETA], mirrored[at + M_DPHI] = rough_place(
-            r_x, r_y, r_z, cos_phi, sin_phi, n_theta, n_dphi
+            r.x, r.y, r.z, beam.cos_phi, beam.sin_phi, n_theta, n_dphi
         )
 
 

@@ -14,15 +14,14 @@ from pbrdf.kernels.paths.shading import (
     N_ESCAPED,
     N_RECORD,
     SPECULAR,
-    TURN_C,
-    TURN_S,
     WEIGHT,
     add_light,
     begin_columns,
     lost_energy,
-    reflect_column,
+    reflect_columns,
     reflect_often,
     reflect_twice,
+    turn_at,
     turn_columns,
     weigh,
 )
@@ -52,6 +51,12 @@ def keep_path(end, record, ray, bounces, i_theta, i_dphi, spectra, optics, tally
 
 
 @jit(forceinline=True)
+def tabulated(paths, row, w, table):
+    """Elements of the mirror reflection of a row."""
+    return table_elements(table, w, int(paths[row, 0, LABEL]), paths[row, 0, COS_IN])
+
+
+@jit(forceinline=True)
 def mirror_path(paths, row, bounces, w, table, n_stokes, mueller):
     """Mueller matrix of a path of mirror reflections alone, with tabulated elements.
 
@@ -61,30 +66,17 @@ def mirror_path(paths, row, bounces, w, table, n_stokes, mueller):
         if paths[row + bounce, 0, COS_OUT] != SPECULAR:
             return False
     if bounces == 2:
-        a, b, c, d = table_elements(
-            table, w, int(paths[row, 0, LABEL]), paths[row, 0, COS_IN]
-        )
-        a2, b2, c2, d2 = table_elements(
-            table, w, int(paths[row + 1, 0, LABEL]), paths[row + 1, 0, COS_IN]
-        )
         reflect_twice(
-            a, b, c, d, a2, b2, c2, d2,
-            paths[row, 0, TURN_C], paths[row, 0, TURN_S],
-            paths[row + 1, 0, TURN_C], paths[row + 1, 0, TURN_S],
-            paths[row + 2, 0, TURN_C], paths[row + 2, 0, TURN_S], n_stokes, mueller,
+            tabulated(paths, row, w, table), tabulated(paths, row + 1, w, table),
+            turn_at(paths, row, 0), turn_at(paths, row + 1, 0), turn_at(paths, row + 2, 0),
+            n_stokes, mueller,
         )  # fmt: skip
         return True
     begin_columns(n_stokes, mueller)
-    for bounce in range(bounces):
-        here = row + bounce
-        turn_columns(paths[here, 0, TURN_C], paths[here, 0, TURN_S], n_stokes, mueller)
-        a, b, c, d = table_elements(
-            table, w, int(paths[here, 0, LABEL]), paths[here, 0, COS_IN]
-        )
-        for column in range(n_stokes):
-            reflect_column(a, b, c, d, column, mueller)
-    here = row + bounces
-    turn_columns(paths[here, 0, TURN_C], paths[here, 0, TURN_S], n_stokes, mueller)
+    for here in range(row, row + bounces):
+        turn_columns(turn_at(paths, here, 0), n_stokes, mueller)
+        reflect_columns(tabulated(paths, here, w, table), n_stokes, mueller)
+    turn_columns(turn_at(paths, row + bounces, 0), n_stokes, mueller)
     return True
 
 

@@ -3,16 +3,10 @@
 import math
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.paths.ray_bounce import mirror
-from pbrdf.kernels.paths.transport import MAX_STEPS
-from pbrdf.kernels.terrain.heightfield import (
-    ESCAPED,
-    HIT,
-    SIDE,
-    facet_slopes,
-    leave_facet,
-    walk,
-)
+from pbrdf.kernels.optics.vectors import Vec
+from pbrdf.kernels.paths.ground import first_facet, next_facet, normal_of_facet
+from pbrdf.kernels.paths.ray_bounce import mirror_at
+from pbrdf.kernels.terrain.heightfield import ESCAPED, HIT, SIDE
 
 MOST_BOUNCES = 8
 
@@ -31,31 +25,22 @@ def ways_to_clear(terrain, sin_theta, cos_theta, azimuths, launch, ways):
             ways[a, b, 0] = 0.0
             ways[a, b, 1] = 0.0
             phi = azimuths[(a * columns + b) % azimuths.shape[0]]
-            k_x = -sin_theta * math.cos(phi)
-            k_y = -sin_theta * math.sin(phi)
-            k_z = -cos_theta
+            k = Vec(-sin_theta * math.cos(phi), -sin_theta * math.sin(phi), -cos_theta)
             x = launch[0] + launch[2] * ((a + 0.5) / rows)
             y = launch[1] + launch[3] * ((b + 0.5) / columns)
             i = min(int(x), terrain.heights.shape[0] - 2)
             j = min(int(y), terrain.heights.shape[1] - 2)
-            fate, i, j, facet, u, v, z = walk(
-                terrain, i, j, -1, x - i, y - j, terrain.z_top, k_x / terrain.pitch_x,
-                k_y / terrain.pitch_y, k_z, 0.0, MAX_STEPS,
-            )  # fmt: skip
-            foot = z
-            for _ in range(MOST_BOUNCES):
+            fate, place = first_facet(terrain, None, i, j, x - i, y - j, k)
+            foot = place.z
+            for _bounce in range(MOST_BOUNCES):
                 if fate != HIT:
                     break
-                foot = z
-                slope_x, slope_y = facet_slopes(terrain, i, j, facet)
-                k_x, k_y, k_z, _, _, _, leave_rate, _ = mirror(
-                    k_x, k_y, k_z, slope_x, slope_y
-                )
-                fate, i, j, facet, u, v, z = leave_facet(
-                    terrain, i, j, facet, u, v, z, k_x, k_y, k_z, leave_rate, MAX_STEPS
-                )
-            level = math.sqrt(k_x * k_x + k_y * k_y)
-            if fate in (ESCAPED, SIDE) and k_z < terrain.steepest * level:
-                time = (terrain.z_top - foot) / max(k_z, 1e-9)
-                ways[a, b, 0] = k_x * time / terrain.pitch_x
-                ways[a, b, 1] = k_y * time / terrain.pitch_y
+                foot = place.z
+                normal, steep = normal_of_facet(terrain, None, place)
+                k, _, cosine = mirror_at(k, normal)
+                fate, place = next_facet(terrain, None, None, place, k, cosine * steep)
+            level = math.sqrt(k.x * k.x + k.y * k.y)
+            if fate in (ESCAPED, SIDE) and k.z < terrain.steepest * level:
+                time = (terrain.z_top - foot) / max(k.z, 1e-9)
+                ways[a, b, 0] = k.x * time / terrain.pitch_x
+                ways[a, b, 1] = k.y * time / terrain.pitch_y

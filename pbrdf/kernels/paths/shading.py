@@ -12,6 +12,7 @@ from collections import namedtuple
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.optics.fresnel import reflection_elements, transmission_elements
+from pbrdf.kernels.optics.light import reflected, returned, turned
 from pbrdf.kernels.optics.volume import internal_reflectance
 
 # The substrate: index and `base_strength` by (wavelength, material), base of no width where
@@ -53,8 +54,11 @@ def base_strength(albedo, n, kappa):
 
 
 @jit(forceinline=True)
-def reflect_once(a, b, c, d, c_in, s_in, c_out, s_out, n_stokes, mueller):
+def reflect_once(elements, turn_in, turn_out, n_stokes, mueller):
     """Mueller matrix R(out) F(beta) R(in) of a path with one bounce, paper eq. (16)."""
+    a, b, c, d = elements
+    c_in, s_in = turn_in
+    c_out, s_out = turn_out
     mueller[0, 0] = a
     if n_stokes == 1:
         return
@@ -77,10 +81,13 @@ def reflect_once(a, b, c, d, c_in, s_in, c_out, s_out, n_stokes, mueller):
 
 
 @jit(forceinline=True)
-def reflect_twice(
-    a1, b1, c1, d1, a2, b2, c2, d2, cos1, sin1, cos2, sin2, cos3, sin3, n_stokes, mueller
-):  # fmt: skip
+def reflect_twice(first, second, turn_1, turn_2, turn_3, n_stokes, mueller):
     """Mueller matrix R(3) F(beta_2) R(2) F(beta_1) R(1) of a path with two bounces."""
+    a1, b1, c1, d1 = first
+    a2, b2, c2, d2 = second
+    cos1, sin1 = turn_1
+    cos2, sin2 = turn_2
+    cos3, sin3 = turn_3
     # Into the second facet's frame, and reflected by it
     ca, cb = cos2 * a1, cos2 * b1
     mueller[0, 0] = a2 * a1 + b2 * cb
@@ -116,36 +123,42 @@ def reflect_twice(
 
 
 @jit(forceinline=True)
-def reflect_column(a, b, c, d, column, mueller):
-    """One column of a matrix after Fresnel reflection, paper eq. (10)."""
-    i = mueller[0, column]
-    q = mueller[1, column]
-    u = mueller[2, column]
-    v = mueller[3, column]
-    mueller[0, column] = a * i + b * q
-    mueller[1, column] = b * i + a * q
-    mueller[2, column] = c * u - d * v
-    mueller[3, column] = d * u + c * v
-
-
-@jit(forceinline=True)
-def scatter_column(strength, a_in, b_in, a_out, b_out, column, mueller):
-    """One column after the base: in through the interface, depolarised, out through it."""
-    inside = strength * (a_in * mueller[0, column] + b_in * mueller[1, column])
-    mueller[0, column] = a_out * inside
-    mueller[1, column] = b_out * inside
-    mueller[2, column] = 0.0
-    mueller[3, column] = 0.0
-
-
-@jit(forceinline=True)
-def turn_columns(c2, s2, n_stokes, mueller):
-    """Turn the frame of all columns of a matrix."""
+def reflect_columns(elements, n_stokes, mueller):
+    """Reflect all columns of a matrix."""
     for column in range(n_stokes):
-        q = mueller[1, column]
-        u = mueller[2, column]
-        mueller[1, column] = c2 * q + s2 * u
-        mueller[2, column] = c2 * u - s2 * q
+        (
+            mueller[0, column], mueller[1, column], mueller[2, column], mueller[3, column],
+        ) = reflected(
+            elements, mueller[0, column], mueller[1, column], mueller[2, column],
+            mueller[3, column],
+        )  # fmt: skip
+
+
+@jit(forceinline=True)
+def scatter_columns(strength, a_in, b_in, a_out, b_out, n_stokes, mueller):
+    """Send all columns of a matrix through the base and back."""
+    for column in range(n_stokes):
+        mueller[0, column], mueller[1, column] = returned(
+            strength, a_in, b_in, a_out, b_out, mueller[0, column], mueller[1, column]
+        )
+        mueller[2, column] = 0.0
+        mueller[3, column] = 0.0
+
+
+@jit(forceinline=True)
+def turn_columns(turn, n_stokes, mueller):
+    """Turn the frame of all columns of a matrix."""
+    c2, s2 = turn
+    for column in range(n_stokes):
+        mueller[1, column], mueller[2, column] = turned(
+            c2, s2, mueller[1, column], mueller[2, column]
+        )
+
+
+@jit(forceinline=True)
+def turn_at(record, bounce, ray):
+    """Cosine and sine of the turn before a bounce."""
+    return record[bounce, ray, TURN_C], record[bounce, ray, TURN_S]
 
 
 @jit(forceinline=True)
@@ -163,51 +176,43 @@ def reflect_often(record, ray, bounces, w, optics, n_stokes, mueller):
     begin_columns(n_stokes, mueller)
     for bounce in range(bounces + 1):
         # Into the frame of the facet, or after the last bounce of the exit direction
-        turn_columns(
-            record[bounce, ray, TURN_C], record[bounce, ray, TURN_S], n_stokes, mueller
-        )
+        turn_columns(turn_at(record, bounce, ray), n_stokes, mueller)
         if bounce == bounces:
             break
         cos_in = record[bounce, ray, COS_IN]
         cos_out = record[bounce, ray, COS_OUT]
         m = int(record[bounce, ray, LABEL])
         if cos_out == SPECULAR:
-            a, b, c, d = reflection_elements(cos_in, n[w, m], kappa[w, m])
-            for column in range(n_stokes):
-                reflect_column(a, b, c, d, column, mueller)
+            elements = reflection_elements(cos_in, n[w, m], kappa[w, m])
+            reflect_columns(elements, n_stokes, mueller)
         else:
             a_in, b_in, _, _ = transmission_elements(cos_in, n[w, m], kappa[w, m])
             a_out, b_out, _, _ = transmission_elements(cos_out, n[w, m], kappa[w, m])
-            for column in range(n_stokes):
-                scatter_column(base[w, m], a_in, b_in, a_out, b_out, column, mueller)
+            scatter_columns(base[w, m], a_in, b_in, a_out, b_out, n_stokes, mueller)
+
+
+@jit(forceinline=True)
+def elements_at(record, bounce, ray, w, optics):
+    """Elements of the mirror reflection of a bounce."""
+    m = int(record[bounce, ray, LABEL])
+    return reflection_elements(
+        record[bounce, ray, COS_IN], optics.n[w, m], optics.kappa[w, m]
+    )
 
 
 @jit(forceinline=True)
 def path_mueller(record, ray, bounces, w, optics, n_stokes, mueller):
     """Mueller matrix of a path, by the closed form where it has one mirror reflection."""
     if bounces == 1 and record[0, ray, COS_OUT] == SPECULAR:
-        m = int(record[0, ray, LABEL])
-        a, b, c, d = reflection_elements(
-            record[0, ray, COS_IN], optics.n[w, m], optics.kappa[w, m]
-        )
         reflect_once(
-            a, b, c, d, record[0, ray, TURN_C], record[0, ray, TURN_S],
-            record[1, ray, TURN_C], record[1, ray, TURN_S], n_stokes, mueller,
+            elements_at(record, 0, ray, w, optics),
+            turn_at(record, 0, ray), turn_at(record, 1, ray), n_stokes, mueller,
         )  # fmt: skip
     elif bounces == 2 and record[0, ray, COS_OUT] == SPECULAR == record[1, ray, COS_OUT]:
-        m = int(record[0, ray, LABEL])
-        a1, b1, c1, d1 = reflection_elements(
-            record[0, ray, COS_IN], optics.n[w, m], optics.kappa[w, m]
-        )
-        m = int(record[1, ray, LABEL])
-        a2, b2, c2, d2 = reflection_elements(
-            record[1, ray, COS_IN], optics.n[w, m], optics.kappa[w, m]
-        )
         reflect_twice(
-            a1, b1, c1, d1, a2, b2, c2, d2,
-            record[0, ray, TURN_C], record[0, ray, TURN_S],
-            record[1, ray, TURN_C], record[1, ray, TURN_S],
-            record[2, ray, TURN_C], record[2, ray, TURN_S], n_stokes, mueller,
+            elements_at(record, 0, ray, w, optics), elements_at(record, 1, ray, w, optics),
+            turn_at(record, 0, ray), turn_at(record, 1, ray), turn_at(record, 2, ray),
+            n_stokes, mueller,
         )  # fmt: skip
     else:
         reflect_often(record, ray, bounces, w, optics, n_stokes, mueller)

@@ -7,10 +7,10 @@ narrow against the law give it to rounding.
 """
 
 from collections import namedtuple
-from math import ceil, erfc, exp, log, pi, sqrt
+from math import ceil, erfc, exp, log, pi, sqrt, tau
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.bins.binning import HALF_PI, TWO_PI
+from pbrdf.kernels.bins.binning import HALF_PI
 from pbrdf.kernels.microfacet.facet import directions, mirror_facet, rotated_elements
 from pbrdf.kernels.optics.elementary import cos, sin
 from pbrdf.kernels.optics.fresnel import facet_elements
@@ -157,7 +157,7 @@ def fill_light(theta_i, phi, law, rules, n, kappa, n_stokes, light, cells):
     `Rules`.
     """
     n_theta, n_dphi = cells.shape[:2]
-    step, turn = HALF_PI / n_theta, TWO_PI / n_dphi
+    step, turn = HALF_PI / n_theta, tau / n_dphi
     share = 1.0 / phi.size
     light[:] = 0.0
     cells[:] = 0.0

@@ -7,10 +7,10 @@ known probability.
 """
 
 from collections import namedtuple
-from math import cos, erfc, exp, floor, log, sin, sqrt
+from math import cos, erfc, exp, floor, log, sin, sqrt, tau
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.bins.binning import HALF_PI, TWO_PI
+from pbrdf.kernels.bins.binning import HALF_PI
 from pbrdf.kernels.microfacet.facet import directions, mirror_facet
 from pbrdf.kernels.paths.random import uniform_pair
 from pbrdf.kernels.sights.light import RISE_DPHI, RISE_THETA, overhang
@@ -145,7 +145,7 @@ def look(mesh, ensemble, looks, seen):
     """Fill in how often facets are seen in units of Smith's rule (cells, cells)."""
     n_theta, n_dphi = seen.shape
     nx, ny = mesh.terrain.heights.shape
-    step, turn = HALF_PI / n_theta, TWO_PI / n_dphi
+    step, turn = HALF_PI / n_theta, tau / n_dphi
     number = 0
     for row in range(n_theta):
         for column in range(n_dphi):
@@ -164,7 +164,7 @@ def look(mesh, ensemble, looks, seen):
                 x, y = uniform_pair(looks.stream, number, 1)
                 point = uniform_pair(looks.stream, number, 2)
                 chance, turned = uniform_pair(looks.stream, number, 3)
-                phi = TWO_PI * turned if looks.uniform_phi else looks.phi
+                phi = tau * turned if looks.uniform_phi else looks.phi
                 number += 1
                 total += one_look(
                     mesh, ensemble, looks, (int(x * nx), int(y * ny)), point,

@@ -34,6 +34,12 @@ Given = namedtuple("Given", "i j bend lift change_x change_y before")
 # far as half a period: largest height and largest rise from node to node (strides, 2), for
 # three changes and then for those of a facet
 Reach = namedtuple("Reach", "stride half bent")
+# A ray among the lines of the grid: direction in cells per unit of time, and times from one
+# line along y, along x and from one diagonal to the next
+Pace = namedtuple("Pace", "speed_x speed_y per_x per_y per_d")
+# Where it is: cell, place in the plane relative to the cell at the time 0, and the times at
+# which it crosses the next of these lines
+Among = namedtuple("Among", "i j x0 y0 t_x t_y t_d")
 NEVER = 1e300
 MAX_STEPS = 1_000_000
 
@@ -176,6 +182,83 @@ def crossings(t_next, t_end, per, most):
 
 
 @jit(forceinline=True)
+def enter_grid(given, u, v, speed_x, speed_y):
+    """Pace of a ray among the lines of the grid, and where it is as it starts."""
+    per_x = 1.0 / abs(speed_x) if speed_x != 0.0 else NEVER
+    per_y = 1.0 / abs(speed_y) if speed_y != 0.0 else NEVER
+    turn = speed_x - speed_y
+    per_d = 1.0 / abs(turn) if turn != 0.0 else NEVER
+    t_x = (1.0 - u if speed_x > 0.0 else u) * per_x
+    t_y = (1.0 - v if speed_y > 0.0 else v) * per_y
+    side = u - v if u > v else u - v + 1.0
+    t_d = (1.0 - side if turn > 0.0 else side) * per_d
+    return (
+        Pace(speed_x, speed_y, per_x, per_y, per_d),
+        Among(given.i, given.j, u, v, t_x, t_y, t_d),
+    )
+
+
+@jit(forceinline=True)
+def pass_block(terrain, at, pace):
+    """Where a ray is in the last cell of its block."""
+    nx, ny = terrain.heights.shape
+    i, j, x0, y0, t_x, t_y, t_d = at
+    cells_x = cells_left(i, nx, pace.speed_x)
+    cells_y = cells_left(j, ny, pace.speed_y)
+    t_end = min(t_x + cells_x * pace.per_x, t_y + cells_y * pace.per_y)
+    count = crossings(t_x, t_end, pace.per_x, cells_x)
+    t_x += count * pace.per_x
+    i += count if pace.speed_x > 0.0 else -count
+    x0 -= count if pace.speed_x > 0.0 else -count
+    count = crossings(t_y, t_end, pace.per_y, cells_y)
+    t_y += count * pace.per_y
+    j += count if pace.speed_y > 0.0 else -count
+    y0 -= count if pace.speed_y > 0.0 else -count
+    t_d += crossings(t_d, t_end, pace.per_d, 2 * BLOCK) * pace.per_d
+    return Among(i, j, x0, y0, t_x, t_y, t_d)
+
+
+@jit(forceinline=True)
+def step_to(i, n, speed):
+    """Line that a ray in cell i meets next, the cell behind it, and its place's change."""
+    if speed > 0.0:
+        ahead = i + 1 if i + 1 < n else 0
+        return ahead, ahead, -1.0
+    return i, i - 1 if i > 0 else n - 1, 1.0
+
+
+@jit(forceinline=True)
+def cross_line(mesh, given, at, pace, t, look):
+    """Cross the next line at the time t: where the ray is then, and what it crosses.
+
+    That is the height of the bent mesh there and its share in a lift, if asked to look.
+    """
+    nx, ny = mesh.terrain.heights.shape
+    i, j, x0, y0, t_x, t_y, t_d = at
+    surface, follows = 0.0, 0.0
+    if t == t_x:
+        line, i, change = step_to(i, nx, pace.speed_x)
+        if look:
+            share = y0 + pace.speed_y * t
+            surface, follows = crossing_along_y(mesh, given, line, j, share)
+        t_x += pace.per_x
+        x0 += change
+    elif t == t_y:
+        line, j, change = step_to(j, ny, pace.speed_y)
+        if look:
+            share = x0 + pace.speed_x * t
+            surface, follows = crossing_along_x(mesh, given, i, line, share)
+        t_y += pace.per_y
+        y0 += change
+    else:
+        if look:
+            share = x0 + pace.speed_x * t
+            surface, follows = crossing_on_diagonal(mesh, given, i, j, share)
+        t_d += pace.per_d
+    return Among(i, j, x0, y0, t_x, t_y, t_d), surface, follows
+
+
+@jit(forceinline=True)
 def least_lift(mesh, given, reach, lift, most, u, v, z, speed_x, speed_y, speed_z):
     """Least lift, from `lift` on, at which a rising ray meets no other facet.
 
@@ -186,89 +269,39 @@ def least_lift(mesh, given, reach, lift, most, u, v, z, speed_x, speed_y, speed_
     The mesh is linear along the ray but where it crosses a grid line or a diagonal.
     """
     terrain = mesh.terrain
-    nx, ny = terrain.heights.shape
     maxima = terrain.maxima
     offset, row = terrain.levels[BLOCK_LEVEL - 1]
-    i, j = given.i, given.j
-    per_x = 1.0 / abs(speed_x) if speed_x != 0.0 else NEVER
-    per_y = 1.0 / abs(speed_y) if speed_y != 0.0 else NEVER
-    turn = speed_x - speed_y
-    per_d = 1.0 / abs(turn) if turn != 0.0 else NEVER
-    t_x = (1.0 - u if speed_x > 0.0 else u) * per_x
-    t_y = (1.0 - v if speed_y > 0.0 else v) * per_y
-    side = u - v if u > v else u - v + 1.0
-    t_d = (1.0 - side if turn > 0.0 else side) * per_d
-    # Place in the plane relative to the current cell is x0 + speed t
-    x0, y0 = u, v
+    pace, at = enter_grid(given, u, v, speed_x, speed_y)
     bent = reach.bent
-    per_stride = min(per_x, per_y) * reach.stride
+    per_stride = min(pace.per_x, pace.per_y) * reach.stride
     # Where the next image of the facet comes near the ray must be above all of it
-    above = z + speed_z * min(per_x, per_y) * reach.half - terrain.z_top
+    above = z + speed_z * min(pace.per_x, pace.per_y) * reach.half - terrain.z_top
     stride = 0
     t_stride = per_stride
     height = bent_by(bent, 0, 0, given, lift)
     far = above + lift >= height
     if far and knows_free(
-        terrain, i, j, z + lift, speed_x, speed_y, speed_z, bent, 0, given, lift
+        terrain, at.i, at.j, z + lift, speed_x, speed_y, speed_z, bent, 0, given, lift
     ):
         return lift
     block = -1
     block_top = 0.0
     t_in = 0.0
     for step in range(MAX_STEPS):
-        here = (i >> SHIFT) * row + (j >> SHIFT)
+        here = (at.i >> SHIFT) * row + (at.j >> SHIFT)
         if here != block:
             block = here
             block_top = maxima[offset + block]
             if step > 0 and z + lift + speed_z * t_in > block_top + height:
                 # A rising ray that enters above a block passes above all of it
-                cells_x = cells_left(i, nx, speed_x)
-                cells_y = cells_left(j, ny, speed_y)
-                t_end = min(t_x + cells_x * per_x, t_y + cells_y * per_y)
-                count = crossings(t_x, t_end, per_x, cells_x)
-                t_x += count * per_x
-                i += count if speed_x > 0.0 else -count
-                x0 -= count if speed_x > 0.0 else -count
-                count = crossings(t_y, t_end, per_y, cells_y)
-                t_y += count * per_y
-                j += count if speed_y > 0.0 else -count
-                y0 -= count if speed_y > 0.0 else -count
-                t_d += crossings(t_d, t_end, per_d, 2 * BLOCK) * per_d
-        t = min(t_x, min(t_y, t_d))
+                at = pass_block(terrain, at, pace)
+        t = min(at.t_x, min(at.t_y, at.t_d))
         z_ray = z + lift + speed_z * t
         if z_ray > terrain.z_top + height:
             return lift
         # The rim of the cell is below the highest point of its block
         look = step > 0 and z_ray <= block_top + height
-        surface, follows = 0.0, 0.0
-        if t == t_x:
-            ahead = i + 1 if speed_x > 0.0 else i
-            ahead = ahead if ahead < nx else 0
-            if look:
-                surface, follows = crossing_along_y(mesh, given, ahead, j, y0 + speed_y * t)
-            t_x += per_x
-            if speed_x > 0.0:
-                i = ahead
-                x0 -= 1.0
-            else:
-                i = i - 1 if i > 0 else nx - 1
-                x0 += 1.0
-        elif t == t_y:
-            ahead = j + 1 if speed_y > 0.0 else j
-            ahead = ahead if ahead < ny else 0
-            if look:
-                surface, follows = crossing_along_x(mesh, given, i, ahead, x0 + speed_x * t)
-            t_y += per_y
-            if speed_y > 0.0:
-                j = ahead
-                y0 -= 1.0
-            else:
-                j = j - 1 if j > 0 else ny - 1
-                y0 += 1.0
-        else:
-            if look:
-                surface, follows = crossing_on_diagonal(mesh, given, i, j, x0 + speed_x * t)
-            t_d += per_d
+        at, surface, follows = cross_line(mesh, given, at, pace, t, look)
         t_in = t
         if look:
             missing = surface + follows * lift - z_ray
@@ -283,8 +316,8 @@ def least_lift(mesh, given, reach, lift, most, u, v, z, speed_x, speed_y, speed_
             t_stride += per_stride
             height = bent_by(bent, stride, 0, given, lift)
             if knows_free(
-                terrain, i, j, z + lift + speed_z * t, speed_x, speed_y, speed_z, bent,
-                stride, given, lift,
+                terrain, at.i, at.j, z + lift + speed_z * t, speed_x, speed_y, speed_z,
+                bent, stride, given, lift,
             ):  # fmt: skip
                 return lift
     return most

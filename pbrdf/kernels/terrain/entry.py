@@ -9,8 +9,9 @@ import math
 from collections import namedtuple
 
 from pbrdf.kernels import jit
+from pbrdf.kernels.optics.frames import carried_axis
+from pbrdf.kernels.optics.vectors import Vec
 
-TWO_PI = 2.0 * math.pi
 # Irrational strides: successive lines take evenly spread offsets and azimuths for any count
 STRIDE_OFFSET = 0.6180339887498949
 STRIDE_PHI = 0.7548776662466927
@@ -27,6 +28,9 @@ Source = namedtuple(
     "sin_theta cos_theta phi uniform_phi launch n_lines n_rays shifts stream spread",
     defaults=(0.0,),
 )
+# Light of a line: cosine and sine of the azimuth from which dphi counts, sine and cosine of
+# its zenith angle, cosine and sine of its own azimuth, and its s axis
+Beam = namedtuple("Beam", "cos_phi sin_phi sin_t cos_t cos_b sin_b s")
 
 
 @jit(forceinline=True)
@@ -43,23 +47,22 @@ def line_beam(line, source):
     parts of the flux through the mean surface, equal areas of the ellipse into which the
     plane sees it, get equally many lines. A polariser in front of it is carried along the
     great circle from the axis of the cone.
-
-    Returns cos and sin of the azimuth from which dphi counts, sin and cos of the zenith
-    angle and cos and sin of the azimuth of the light, and its s axis.
     """
     shifts = source.shifts
     phi = source.phi
     if source.uniform_phi:
-        phi = TWO_PI * fraction(line * STRIDE_PHI + shifts[2])
+        phi = math.tau * fraction(line * STRIDE_PHI + shifts[2])
     cos_phi = math.cos(phi)
     sin_phi = math.sin(phi)
     sin_t, cos_t = source.sin_theta, source.cos_theta
     if source.spread == 0.0:
-        return cos_phi, sin_phi, sin_t, cos_t, cos_phi, sin_phi, sin_phi, -cos_phi, 0.0
+        return Beam(
+            cos_phi, sin_phi, sin_t, cos_t, cos_phi, sin_phi, Vec(sin_phi, -cos_phi, 0.0)
+        )
 
     # The axis and two directions across it; `along` lies in its meridian plane
     radius = source.spread * math.sqrt(fraction(line * STRIDE_RADIUS + shifts[3]))
-    angle = TWO_PI * fraction(line * STRIDE_ANGLE + shifts[4])
+    angle = math.tau * fraction(line * STRIDE_ANGLE + shifts[4])
     along = radius * math.cos(angle)
     across = radius * math.sin(angle)
     middle = math.sqrt(1.0 - source.spread * source.spread)
@@ -68,18 +71,17 @@ def line_beam(line, source):
     y = forward * sin_phi + across * cos_phi
     level = math.sqrt(x * x + y * y)
     z = math.sqrt(max(1.0 - level * level, 0.0))
-    # Beams travel along k = -(x, y, z), that of the axis along a: s - (s . k)/(1 + a . k)
-    # (a + k) carries the axis s of a to k
-    s_x, s_y = sin_phi, -cos_phi
-    share = (s_x * x + s_y * y) / (
-        1.0 + x * sin_t * cos_phi + y * sin_t * sin_phi + z * cos_t
-    )
-    s_x -= share * (sin_t * cos_phi + x)
-    s_y -= share * (sin_t * sin_phi + y)
-    s_z = -share * (cos_t + z)
+    axis = Vec(sin_t * cos_phi, sin_t * sin_phi, cos_t)
+    s = carried_axis(axis, Vec(sin_phi, -cos_phi, 0.0), Vec(x, y, z))
     if level == 0.0:
-        return cos_phi, sin_phi, 0.0, 1.0, cos_phi, sin_phi, s_x, s_y, s_z
-    return cos_phi, sin_phi, level, z, x / level, y / level, s_x, s_y, s_z
+        return Beam(cos_phi, sin_phi, 0.0, 1.0, cos_phi, sin_phi, s)
+    return Beam(cos_phi, sin_phi, level, z, x / level, y / level, s)
+
+
+@jit(forceinline=True)
+def way_of(beam):
+    """Direction in which the light of a line travels, away from the source."""
+    return Vec(-beam.sin_t * beam.cos_b, -beam.sin_t * beam.sin_b, -beam.cos_t)
 
 
 @jit(forceinline=True)
@@ -91,7 +93,7 @@ def entry_line(line, source, pitch_x, pitch_y):
     units of the ray spacing, and cos and sin of the azimuth of the source.
     """
     launch, shifts = source.launch, source.shifts
-    cos_phi, sin_phi, _, _, cos_b, sin_b, _, _, _ = line_beam(line, source)
+    cos_phi, sin_phi, _, _, cos_b, sin_b, _ = line_beam(line, source)
     across = (line + shifts[0]) / source.n_lines
     offset = fraction(line * STRIDE_OFFSET + shifts[1])
     down_x = -cos_b / pitch_x
@@ -122,3 +124,27 @@ def first_ray(line, source):
 def wrap_into(x, low, length):
     """Place x, brought into [low, low + length) by whole lengths."""
     return low + length * fraction((x - low) / length)
+
+
+@jit(forceinline=True)
+def rays_of_line(line, source, pitch_x, pitch_y):
+    """Light of a line, its first ray, how many rays it has, and its entry points."""
+    start_x, start_y, speed_x, speed_y, length, _, offset, _, _ = entry_line(
+        line, source, pitch_x, pitch_y
+    )
+    first = first_ray(line, source)
+    return (
+        line_beam(line, source), first, first_ray(line + 1, source) - first,
+        (start_x, start_y, speed_x, speed_y, length, offset),
+    )  # fmt: skip
+
+
+@jit(forceinline=True)
+def entry_point(points, ray, rays, launch):
+    """Entry point (x, y) of a ray of a line [cells]."""
+    start_x, start_y, speed_x, speed_y, length, offset = points
+    s = length * ((ray + offset) / rays)
+    return (
+        wrap_into(start_x + speed_x * s, launch[0], launch[2]),
+        wrap_into(start_y + speed_y * s, launch[1], launch[3]),
+    )

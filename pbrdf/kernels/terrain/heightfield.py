@@ -170,8 +170,6 @@ def fall(heights, periodic, i, j, u, v, z, speed_z, t_limit):
     return HIT, i, j, facet, u, v, surface, t
 
 
-# One loop on purpose: every step decides between blocks, cells and facets, and a call in it
-# would cost as much as the step
 @jit(forceinline=True)
 def walk_until(
     terrain, i, j, facet, u, v, z, speed_x, speed_y, speed_z, leave_rate, t_limit, max_steps
@@ -181,6 +179,10 @@ def walk_until(
     With facet >= 0 the ray starts on that facet and leaves it at `leave_rate` > 0 per unit
     of t; with -1 it starts in free space. Beyond t_limit nothing matters: the fate is then
     REACHED, or ESCAPED. Returns (fate, i, j, facet, u, v, z, t).
+
+    One loop in one function on purpose: every step decides between blocks, cells and
+    facets, and what a part of its own would have to be told and to return costs as much as
+    the step.
     """
     heights, maxima, levels = terrain.heights, terrain.maxima, terrain.levels
     periodic, z_top = terrain.periodic, terrain.z_top

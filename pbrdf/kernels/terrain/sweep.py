@@ -30,9 +30,9 @@ def sweep_line(terrain, line, source, z_start, meetings):
     start_x, start_y, speed_x, speed_y, length, unit, offset, _, _ = entry_line(
         line, source, terrain.pitch_x, terrain.pitch_y
     )
-    _, _, sin_t, cos_t, _, _, _, _, _ = line_beam(line, source)
+    beam = line_beam(line, source)
     rays = first_ray(line + 1, source) - first_ray(line, source)
-    drift = sin_t / cos_t / unit  # in s per height
+    drift = beam.sin_t / beam.cos_t / unit  # in s per height
     forward_x = speed_x >= 0.0
     forward_y = speed_y >= 0.0
     per_x = 1.0 / speed_x if speed_x != 0.0 else NEVER

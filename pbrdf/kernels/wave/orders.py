@@ -6,7 +6,7 @@ term; with many, its terms are a smooth bell and every s-th of them gives the su
 exp(-2 pi^2 (width/s)^2). Nothing overflows, and the two meet to rounding.
 """
 
-from math import exp, log, log1p, sqrt
+from math import exp, log, log1p, sqrt, tau
 
 import numpy as np
 
@@ -21,7 +21,6 @@ GAUSSIAN, EXPONENTIAL = range(2)
 # Half-width of a window in standard deviations, and terms in one: both leave 1e-15
 REACH, TERMS_IN_WIDTH = 8.5, 1.3
 LEAST_EXPONENT = -745.0
-TWO_PI = 2.0 * np.pi
 
 
 @jit
@@ -55,7 +54,7 @@ def poisson_weight(n, g):
     n2 = n * n
     stirling = (1.0 / 12 - (1.0 / 360 - (1.0 / 1260 - 1.0 / 1680 / n2) / n2) / n2) / n
     exponent = -g * deviance - stirling
-    return 0.0 if exponent < LEAST_EXPONENT else exp(exponent) / sqrt(TWO_PI * n)
+    return 0.0 if exponent < LEAST_EXPONENT else exp(exponent) / sqrt(tau * n)
 
 
 @jit(forceinline=True)
@@ -67,7 +66,7 @@ def spectrum_of_order(law, dimensions, inverse, kappa):
     fall = 1.0 / (1.0 + 4.0 * kappa * inverse * inverse)
     if dimensions == 1:
         return 2.0 * inverse * fall
-    return TWO_PI * inverse * inverse * fall * sqrt(fall)
+    return tau * inverse * inverse * fall * sqrt(fall)
 
 
 @jit(forceinline=True)

@@ -1,0 +1,106 @@
+"""Samples of a run: realisations of a scene, or batches of rays over one, until enough."""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from pbrdf.scene.scene import Scene
+from pbrdf.simulation.moments import Moments
+from pbrdf.simulation.plan import Plan, Tally
+from pbrdf.simulation.single_bounce import SingleBounce
+from pbrdf.simulation.trace import Target, prepare, trace_sample
+from pbrdf.surface import FixedSurface, HeightMap
+from pbrdf.tracer import arguments
+from pbrdf.tracer.asked import Run
+from pbrdf.tracer.embree import EmbreeField
+from pbrdf.tracer.field import Field
+from pbrdf.tracer.schedule import gather
+from pbrdf.tracer.wet_field import WetField
+
+
+def trace_samples(
+    run: Run, plans: Sequence[Plan], single: Sequence[SingleBounce] | None
+) -> tuple[list[Moments], int]:
+    """Trace samples until there are enough: the moments of each plan, and how many."""
+    # Tallies to use again: to make a large one costs more than to clear it
+    spare: deque[Tally] = deque()
+    if run.batched:
+        # The surface, or the one realisation asked for, stays the same in all batches
+        first = run.root.spawn(1)[0] if arguments.varies(run.scene) else run.root
+        draw = partial(_trace_fixed, _realize(run.scene, plans[0], first), plans, spare)
+    else:
+        draw = partial(_trace_realization, run.scene, plans, single, spare)
+    moments = [
+        Moments(one, None if single is None else single[k]) for k, one in enumerate(plans)
+    ]
+
+    def add(tallies: Sequence[Tally], each: Callable[..., Iterable[Any]]) -> None:
+        for one, tally in zip(moments, tallies, strict=True):
+            one.add(tally, each)
+            spare.append(tally.emptied())
+
+    done = gather(
+        draw, run.root, add, lambda: max(one.rel_error() for one in moments),
+        samples=run.samples, target=run.target, workers=run.workers, progress=run.progress,
+    )  # fmt: skip
+    return moments, done
+
+
+def _realize(scene: Scene, plan: Plan, seed: np.random.SeedSequence) -> Target:
+    """One realisation of the scene, ready for tracing."""
+    surface = scene.surface
+    if not isinstance(surface, FixedSurface):
+        surface = surface.sample(seed)
+    target = prepare(surface, plan.skips)
+    if plan.media is None:
+        return target
+    # Contaminants exclude meshes and the Embree route
+    assert isinstance(target, Field)
+    assert isinstance(surface, HeightMap)
+    return WetField.of(
+        target, surface, scene.contaminants, plan.media, seed,
+        skips_deep="deep" in plan.skips,
+    )  # fmt: skip
+
+
+def _taken(spare: deque[Tally]) -> Tally | None:
+    try:
+        return spare.pop()
+    except IndexError:
+        return None
+
+
+def _trace_fixed(
+    target: Target,
+    plans: Sequence[Plan],
+    spare: deque[Tally],
+    seed: np.random.SeedSequence,
+) -> list[Tally]:
+    """One sample of every azimuth: the same surface, streams and entry points."""
+    return [trace_sample(target, plan, seed, _taken(spare)) for plan in plans]
+
+
+def _trace_realization(
+    scene: Scene,
+    plans: Sequence[Plan],
+    single: Sequence[SingleBounce] | None,
+    spare: deque[Tally],
+    seed: np.random.SeedSequence,
+) -> list[Tally]:
+    heights, rays, looks = seed.spawn(3)
+    if single is None:
+        return _trace_fixed(_realize(scene, plans[0], heights), plans, spare, rays)
+    if all(one.everything for one in single):
+        tallies = [_taken(spare) or Tally.empty(plan) for plan in plans]
+        terrain = None
+    else:
+        target = _realize(scene, plans[0], heights)
+        tallies = _trace_fixed(target, plans, spare, rays)
+        assert isinstance(target, (Field, EmbreeField))  # no bodies on it
+        terrain = (target if isinstance(target, Field) else target.field).terrain
+    for plan, one, tally in zip(plans, single, tallies, strict=True):
+        one.add(terrain, plan, looks, tally)
+    return tallies
