@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from pbrdf.contaminants.arguments import material_of
 from pbrdf.contaminants.bodies import Bodies, Placement, place
 from pbrdf.contaminants.drops import Drops
 from pbrdf.kernels.bodies import bodies as bodies_kernel
@@ -158,9 +159,9 @@ def opaque_drop_notes(contaminants: Sequence[Any], waves: np.ndarray | None) -> 
     """
     notes = []
     for one in contaminants if waves is None else ():
-        if not isinstance(one, Drops) or one.material.has_base:
+        if not isinstance(one, Drops) or material_of(one.material).has_base:
             continue
-        kappa = one.material.index()[1]
+        kappa = material_of(one.material).index()[1]
         thinness = 1.0 - np.cos(min(one.contact_angle, np.pi / 2))
         if kappa >= OPAQUE_KAPPA > kappa * thinness:
             notes.append(
