@@ -14,18 +14,26 @@ from functools import lru_cache
 import numpy as np
 
 from pbrdf.kernels.paths.shading import N_ESCAPED, N_ORDERS
-from pbrdf.kernels.sights.light import ALL, N_CELL, RISE_THETA, SEEN, SlopeLaw, fill_light
-from pbrdf.kernels.sights.looks import Ensemble, Looks, look
+from pbrdf.kernels.sights.light import (
+    ALL,
+    N_CELL,
+    RISE_DPHI,
+    RISE_THETA,
+    SEEN,
+    SlopeLaw,
+    fill_light,
+)
+from pbrdf.kernels.sights.looks import N_OF_LOOK, Ensemble, Looks, look
 from pbrdf.kernels.sights.rules import rules_from
-from pbrdf.kernels.sights.walk import Mesh, Reach
+from pbrdf.kernels.sights.walk import N_OF_RAY, Mesh, Rays, Reach
 from pbrdf.kernels.terrain.heightfield import Terrain
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.plan import Plan, Tally
 from pbrdf.simulation.spectra import WORTHWHILE
 from pbrdf.surface.gaussian import GaussianSurface
 
-# Looks at a facet for each ray of a realisation
-LOOKS_PER_RAY = 0.1
+# Places with a facet for each azimuth's cells, to each ray of a realisation
+PLACES_PER_RAY = 0.02
 # Cells of directions are no wider than these parts of a quarter and of a full circle
 LEAST_THETA, LEAST_DPHI = 30, 60
 # Flux below which hiding changes nothing
@@ -33,8 +41,6 @@ NOTHING = 1e-13
 # Bins darker than this part of the brightest get fewer looks, and below this part none:
 # there Smith's rule stands, with an error as large as what it hides
 DARK, DARKEST = 0.1, 1e-5
-# Time of a look at 45 degrees or so, and of what 1 / cos(theta_s) adds to it
-BASE_TIME, GRAZING_TIME = 1.0, 0.15
 # Azimuths over which a spread source is averaged: from so many, doubled up to so many
 FEW_AZIMUTHS, MANY_AZIMUTHS = 8, 256
 
@@ -66,13 +72,19 @@ class Direction:
         Flux into cells of directions under Smith's rule, of one unit that comes in. [1]
     cells : ndarray, shape (cells, cells, N_CELL)
         Flux of facets that reflect all, with and without hiding; see the kernel.
-    counts : ndarray of int, shape (cells, cells)
-        Looks a realisation.
+    wanted : ndarray of bool, shape (cells, cells)
+        Whether a cell is looked at.
+    places : ndarray of int, shape (cells,)
+        Places a realisation for the cells of each dphi.
+    change : ndarray, shape (cells,)
+        Logarithmic change of the flux of such cells across dphi.
     """
 
     light: np.ndarray
     cells: np.ndarray
-    counts: np.ndarray
+    wanted: np.ndarray
+    places: np.ndarray
+    change: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,10 +140,14 @@ class SingleBounce:
         )
 
     def looks(self) -> np.ndarray:
-        """Count the looks a realisation (angles, n_theta, n_dphi)."""
-        return np.array(
-            [self._by_bin(one.counts[..., None])[..., 0] for one in self.directions]
-        )
+        """Count the places that see a bin in a realisation (angles, n_theta, n_dphi)."""
+        places = []
+        for one in self.directions:
+            # Cells of one azimuth share their places: a bin sees as many as one row of it
+            seen = np.where(one.wanted, one.places, 0)
+            rows = seen.reshape(-1, self.parts[0], seen.shape[1]).max(axis=1)
+            places.append(rows.reshape(len(rows), -1, self.parts[1]).sum(axis=2))
+        return np.array(places)
 
     def explanation(self) -> list[str]:
         """Say what the single bounces do without."""
@@ -140,11 +156,11 @@ class SingleBounce:
                 "Rays and realisations: none. No facet hides another, and single bounces "
                 "are an integral."
             ]
-        looks = int(self.looks().sum(axis=(1, 2)).mean())
+        looks = np.mean([(one.wanted * one.places).sum() for one in self.directions])
         return [
             "Single bounces: not from rays but from the law of the slopes, times the share "
             "of the facets that is seen in units of Smith's rule, from "
-            f"{looks} looks a realisation and direction."
+            f"{looks:.0f} looks a realisation and direction."
         ]
 
     def _by_bin(self, values: np.ndarray) -> np.ndarray:
@@ -170,7 +186,7 @@ class SingleBounce:
         for a, one in enumerate(self.directions):
             if terrain is None:
                 tally.counts[a, [N_ESCAPED, N_ORDERS]] = plan.n_rays
-                seen = np.ones(one.counts.shape)
+                seen = np.ones(one.wanted.shape)
             else:
                 seen = self._look(terrain, plan, a, streams[a])
             for w, light in enumerate(one.light):
@@ -184,13 +200,16 @@ class SingleBounce:
         self, terrain: Terrain, plan: Plan, angle: int, stream: np.uint64
     ) -> np.ndarray:
         one = self.directions[angle]
-        seen = np.ones(one.counts.shape)
-        if one.counts.any():
+        seen = np.ones(one.wanted.shape)
+        if one.wanted.any():
             looks = Looks(
                 plan.theta_i[angle], plan.phi_i or 0.0, plan.phi_i is None,
-                -np.pi / plan.n_dphi, one.cells, one.counts, stream,
+                -np.pi / plan.n_dphi, one.cells, one.wanted, one.places, one.change, stream,
             )  # fmt: skip
-            look(Mesh(terrain, self.along_x, self.along_y), self.ensemble, looks, seen)
+            mesh = Mesh(terrain, self.along_x, self.along_y)
+            room = np.empty((N_OF_RAY + N_OF_LOOK, len(one.wanted)))
+            rays = Rays(*room[:N_OF_RAY])
+            look(mesh, self.ensemble, looks, rays, room[N_OF_RAY:], seen)
         return seen
 
 
@@ -203,9 +222,12 @@ def _direction(
         float(theta), plan.phi_i, law, (plan.n_theta, plan.n_dphi), shape,
         (indices, plan.n_stokes),
     )  # fmt: skip
-    return Direction(
-        light=light, cells=cells, counts=_counts(cells, plan.n_rays * LOOKS_PER_RAY, parts)
+    wanted, places = _places(cells, plan.n_rays * PLACES_PER_RAY, parts)
+    flux = np.where(wanted, cells[..., SEEN], 0.0)
+    change = (flux * cells[..., RISE_DPHI]).sum(axis=0) / np.maximum(
+        flux.sum(axis=0), 1e-300
     )
+    return Direction(light=light, cells=cells, wanted=wanted, places=places, change=change)
 
 
 # Runs that differ in their seeds or rays share their integrals
@@ -250,28 +272,27 @@ def _averaged(
     return light, cells
 
 
-def _counts(cells: np.ndarray, looks: float, parts: tuple[int, int]) -> np.ndarray:
-    """Deal looks to cells so that all bins but dark ones get the same relative error."""
+def _places(
+    cells: np.ndarray, number: float, parts: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cells to look at, and places by column, dealt for like errors of all but dark bins."""
     whole, seen = cells[..., ALL], cells[..., SEEN]
     share = np.divide(seen, whole, out=np.ones_like(seen), where=whole > 0.0)
-    spread = np.sqrt((1.0 - share) / np.maximum(share, 1e-300))
+    variance = (1.0 - share) / np.maximum(share, 1e-300)
     a, b = parts
     n_theta, n_dphi = whole.shape[0] // a, whole.shape[1] // b
     of_bin = seen.reshape(n_theta, a, n_dphi, b).sum(axis=(1, 3))
     area = np.sin(np.pi * (np.arange(n_theta) + 0.5) / n_theta)[:, None]
     bright = of_bin / area
-    dim = np.sqrt(np.minimum(1.0, bright / (DARK * max(bright.max(), 1e-300))))
-    per_bin = np.divide(dim, of_bin, out=np.zeros_like(of_bin), where=of_bin > 0.0)
-    # Long ways take long: for the least error in a given time
-    cosine = np.cos((np.arange(len(whole)) + 0.5) * (np.pi / 2 / len(whole)))
-    spread = spread / np.sqrt(BASE_TIME + GRAZING_TIME / cosine)[:, None]
-    weight = spread * seen * np.repeat(np.repeat(per_bin, a, axis=0), b, axis=1)
-    wanted = looks * weight / max(weight.sum(), 1e-300)
-    counts = np.maximum(np.rint(wanted), 1.0).astype(np.int64)
-    counts[whole - seen < NOTHING / whole.size] = 0
+    dim = np.minimum(1.0, bright / (DARK * max(bright.max(), 1e-300)))
+    per_bin = np.divide(np.sqrt(dim), of_bin, out=np.zeros_like(of_bin), where=of_bin > 0.0)
+    part = seen * np.repeat(np.repeat(per_bin, a, axis=0), b, axis=1)
+    wanted = whole - seen >= NOTHING / whole.size
     dark = bright < DARKEST * bright.max()
-    counts[np.repeat(np.repeat(dark, a, axis=0), b, axis=1)] = 0
-    return counts
+    wanted &= ~np.repeat(np.repeat(dark, a, axis=0), b, axis=1)
+    weight = np.sqrt((part**2 * variance * wanted).sum(axis=0))
+    places = np.rint(number * weight / max(weight.sum(), 1e-300)).astype(np.int64)
+    return wanted, np.where(wanted.any(axis=0), np.maximum(places, 1), 0)
 
 
 def _ensemble(surface: GaussianSurface) -> Ensemble:

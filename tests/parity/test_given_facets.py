@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 
 from pbrdf import GaussianSurface
 from pbrdf.kernels import jit
-from pbrdf.kernels.sights.looks import hold
-from pbrdf.kernels.sights.walk import Mesh, least_lift
+from pbrdf.kernels.sights.looks import facet_place, set_ray
+from pbrdf.kernels.sights.walk import N_OF_RAY, Mesh, Rays, lift_clear
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.single_bounce import SingleBounce
 from pbrdf.simulation.trace import prepare
@@ -20,15 +20,29 @@ ALL_SKIPS = frozenset({"walk", "sweep", "steep", "horizon"})
 
 
 @jit
-def held(mesh, ensemble, i, j, low, slope_x, slope_y):
-    """Compiled `hold` for the tests."""
-    return hold(mesh, ensemble, i, j, low, slope_x, slope_y)
+def placed(mesh, ensemble, i, j, u, v):
+    """Compiled `facet_place` for the tests."""
+    return facet_place(mesh, ensemble, i, j, u, v)
 
 
 @jit
-def lifted(mesh, given, reach, lift, most, u, v, z, speed_x, speed_y, speed_z):
-    """Compiled `least_lift` for the tests."""
-    return least_lift(mesh, given, reach, lift, most, u, v, z, speed_x, speed_y, speed_z)
+def add_ray(rays, k, place, slope_x, slope_y):
+    """Compiled `set_ray` for the tests."""
+    set_ray(rays, k, place, slope_x, slope_y)
+
+
+def steps(low, slope):
+    """First and second step along the edges of a facet."""
+    along = slope[0] * 1.0, slope[1] * 0.8
+    return along if low else along[::-1]
+
+
+def first_corner(place, low, slope):
+    """Height of a facet's first corner without lift."""
+    first, second = steps(low, slope)
+    z = place.start_x * slope[0] + place.start_y * slope[1]
+    u, v = (place.u, place.v) if low else (place.v, place.u)
+    return z - first * u - second * v
 
 
 @pytest.fixture(scope="module", params=[ALL_SKIPS, ALL_SKIPS - {"horizon"}])
@@ -63,7 +77,9 @@ def bent(ensemble, mesh, place, low, slope, lift):
             ]
         return factor
 
-    _, first, step, second = held(mesh, ensemble, *place, low, *slope)
+    point = (0.7, 0.2) if low else (0.2, 0.7)
+    first = first_corner(placed(mesh, ensemble, *place, *point), low, slope)
+    step, second = steps(low, slope)
     wanted = np.array([first, first + step, first + step + second]) + lift
     change = wanted - [heights[node] for node in nodes]
     among = np.array([[covariance(a, b) for b in nodes] for a in nodes])
@@ -88,9 +104,8 @@ def test_the_mesh_is_bent_to_hold_the_facet(scene, low):
     first, second = (b - a, d - b) if low else (d - b, b - a)
     assert_allclose([first / 1.0, second / 0.8], slope, rtol=1e-9)
     # Given the slopes alone the mean height of the facet is that of the regression
-    _, corner, step, second_step = held(mesh, ensemble, 74, 20, low, *slope)
-    assert_allclose(a, corner + 0.4, rtol=1e-9)
-    assert_allclose((step, second_step), (b - a, d - b), rtol=1e-9)
+    expected = ensemble.regression[0 if low else 1] @ slope
+    assert_allclose((a + b + d) / 3, expected + 0.4, rtol=1e-9)
 
 
 def test_heights_are_as_the_slopes_let_expect():
@@ -156,39 +171,40 @@ def clearance(field, place, point, low, direction, most=300.0):
     return gap[1:].min()
 
 
-def test_the_least_lift_is_where_the_ray_begins_to_clear(scene):
+def test_the_least_lift_is_where_each_ray_begins_to_clear(scene):
+    """Rays of one azimuth, each from a facet of its own slopes, against brute force."""
     ensemble, mesh = scene
     rng = np.random.default_rng(5)
     unit = ensemble.remainder[0]
     lifts = []
-    for _ in range(150):
-        place = tuple(int(n * r) for n, r in zip(SURFACE.shape, rng.random(2), strict=True))
+    for _ in range(60):
+        cell = tuple(int(n * r) for n, r in zip(SURFACE.shape, rng.random(2), strict=True))
         point = rng.random(2)
         low = bool(point[0] > point[1])
-        theta, phi = rng.uniform(0.6, 1.5), rng.uniform(0, 2 * np.pi)
-        direction = (
-            np.sin(theta) * np.cos(phi),
-            np.sin(theta) * np.sin(phi),
-            np.cos(theta),
-        )
-        slope = 0.4 * rng.standard_normal(2)
-        if direction[2] <= slope @ direction[:2] + 0.01:
-            continue  # turned away
-        given, z, first, second = held(mesh, ensemble, *place, low, *slope)
-        u, v = point
-        z += first * (u if low else v) + second * (v if low else u)
-        lift = lifted(
-            mesh, given, ensemble.reach, -3.0 * unit, 5.0 * unit, u, v, z,
-            direction[0] / 1.0, direction[1] / 0.8, direction[2],
-        )  # fmt: skip
-        lifts.append(lift / unit)
-        for change, clears in ((-1e-6, False), (1e-6, True)):
-            at = lift + change
-            if (lift <= -3.0 * unit and not clears) or (lift >= 5.0 * unit and clears):
-                continue
-            field = bent(ensemble, mesh, place, low, slope, at)
-            gap = clearance(field, place, point, low, direction)
-            assert (gap > 0) == clears, (place, theta, phi, lift / unit, gap)
+        phi = rng.uniform(0, 2 * np.pi)
+        along = np.array([np.cos(phi), np.sin(phi)])
+        slopes, rises = [], []
+        for rise in 1 / np.tan(rng.uniform(0.6, 1.5, size=5)):
+            slope = 0.4 * rng.standard_normal(2)
+            if rise > slope @ along + 0.01:  # else turned away
+                slopes.append(slope)
+                rises.append(rise)
+        place = placed(mesh, ensemble, *cell, *point)
+        rays = Rays(*np.zeros((N_OF_RAY, len(slopes))))
+        for k, slope in enumerate(slopes):
+            add_ray(rays, k, place, *slope)
+        rays.rise[:] = rises
+        rays.lift[:] = -3.0 * unit
+        most = 5.0 * unit
+        lift_clear(mesh, place, ensemble.reach, rays, most, along[0], along[1] / 0.8)
+        lifts.extend(rays.lift / unit)
+        for slope, rise, lift in zip(slopes, rises, rays.lift, strict=True):
+            for change, clears in ((-1e-6, False), (1e-6, True)):
+                if (lift <= -3.0 * unit and not clears) or (lift >= most and clears):
+                    continue
+                field = bent(ensemble, mesh, cell, low, slope, min(lift, most) + change)
+                gap = clearance(field, cell, point, low, (*along, rise))
+                assert (gap > 0) == clears, (cell, rise, phi, lift / unit, gap)
     lifts = np.array(lifts)
     assert ((lifts > -3.0) & (lifts < 5.0)).sum() > 40
     assert (lifts == -3.0).sum() > 10
