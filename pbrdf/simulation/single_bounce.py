@@ -275,7 +275,7 @@ def _averaged(
 def _places(
     cells: np.ndarray, number: float, parts: tuple[int, int]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Cells to look at, and places by column, dealt for like errors of all but dark bins."""
+    """Cells to look at, and places by column, for like errors of all but dark bins."""
     whole, seen = cells[..., ALL], cells[..., SEEN]
     share = np.divide(seen, whole, out=np.ones_like(seen), where=whole > 0.0)
     variance = (1.0 - share) / np.maximum(share, 1e-300)

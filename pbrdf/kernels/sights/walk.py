@@ -40,7 +40,8 @@ Place = namedtuple(
     "Place", "i j u v level per_x per_y lift start_x start_y old_x old_y old_lift"
 )
 # Rays from facets at a place, by ray: slopes of the facet, height of its point without
-# lift, changes of its slopes without sign, height gained by a unit of way, least lift so far
+# lift, changes of its slopes without sign, height gained by a unit of way, and least lift
+# so far
 Rays = namedtuple("Rays", "slope_x slope_y start change_x change_y rise lift")
 N_OF_RAY = 7
 # How far the mesh is bent at `stride` cells, two strides ... from the facet and beyond, as
