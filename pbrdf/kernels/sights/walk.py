@@ -364,9 +364,7 @@ def lift_clear(mesh, place, reach, rays, most, speed_x, speed_y):
     per_cell = min(pace.per_x, pace.per_y)
     t_half, t_stride = per_cell * reach.half, per_cell * reach.stride
     stride, block, t = 0, -1, 0.0
-    first = first_in_doubt(
-        terrain, place, bent, rays, 0, at, pace, t, stride, t_half, most
-    )
+    first = first_in_doubt(terrain, place, bent, rays, 0, at, pace, t, stride, t_half, most)
     for step in range(MAX_STEPS):
         if first == rays.lift.size:
             return
