@@ -6,7 +6,8 @@
 #   make lint     style, types and the layer rule
 #   make stability  the table of numerical hazards with what was measured of each
 #   make fuzz     damaged files of every format against the readers (COUNT=10000)
-#   make bench    accuracy and speed as ratios        make studies   the study folders
+#   make bench    speed as ratios, then run time against true error (BENCH=--quick)
+#   make studies  the study folders
 #   make docs     the documentation as a web site     make lock      renew the locks
 
 SHELL := /bin/bash
@@ -74,8 +75,11 @@ COUNT ?= 2000
 fuzz: .venv/.dev
 	PYTHONPATH=. $(BIN)/python tests/fuzz/run.py --count $(COUNT)
 
+# What python -m pbrdf.bench is told: --quick --case rough, say
+BENCH ?=
 bench: .venv/.all
 	$(BIN)/python -m pytest -m bench -s
+	$(BIN)/python -m pbrdf.bench $(BENCH)
 
 # One of them: make studies STUDY=real_coatings
 STUDY ?= *

@@ -58,9 +58,9 @@ def true_errors(
     for seed in seeds:
         result, seconds = run(case, side, seed=seed, **options)
         value, _ = light(result)
-        squares.append(((value - truth["value"]) / truth["value"])[bright] ** 2)
+        squares.append((value[bright] / truth["value"][bright] - 1.0) ** 2)
         times.append(seconds)
-    own = (truth["error"] / truth["value"])[bright] ** 2
+    own = (truth["error"][bright] / truth["value"][bright]) ** 2
     by_bin = np.mean(squares, axis=0) - own
     mean, seconds = float(by_bin.mean()), float(np.median(times))
     return {
@@ -82,6 +82,7 @@ def model_errors(case: Case, truth: dict[str, np.ndarray]) -> dict[str, Any] | N
     value = case.model.brdf(case.theta_i, theta_s[:, None], dphi)[..., 0, 0]
     seconds = time.perf_counter() - start
     bright = truth["bright"]
-    square = ((value[None] - truth["value"]) / truth["value"])[bright] ** 2
-    own = (truth["error"] / truth["value"])[bright] ** 2
+    value = np.broadcast_to(value, bright.shape)
+    square = (value[bright] / truth["value"][bright] - 1.0) ** 2
+    own = (truth["error"][bright] / truth["value"][bright]) ** 2
     return {"rms": float(np.sqrt(max((square - own).mean(), 0.0))), "seconds": seconds}
