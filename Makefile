@@ -88,6 +88,7 @@ studies: .venv/.all
 		echo "== $$script"; PYTHONPATH=. $(BIN)/python $$script; done
 
 docs: .venv/.dev
+	PYTHONPATH=. $(BIN)/python docs/make_pages.py
 	$(BIN)/mkdocs build --strict --quiet
 
 COMPILE := $(UV) pip compile --universal --python-version 3.11 --generate-hashes \

@@ -27,6 +27,8 @@ from pbrdf.errors import check_seed
 from pbrdf.validity import judge, roughness_of
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from data_io import Profile
     from pbrdf import HeightMap
 
@@ -48,8 +50,10 @@ class PipelineResult:
 
     Attributes
     ----------
+    surface : Profile or HeightMap
+        The measured surface.
     statistics : SurfaceStatistics
-        Of the measured surface.
+        Of it.
     measurement : Dataset
         The scan.
     analytic : FitResult
@@ -69,6 +73,7 @@ class PipelineResult:
         Elapsed time by stage. [s]
     """
 
+    surface: "Profile | HeightMap"
     statistics: SurfaceStatistics
     measurement: xr.Dataset
     analytic: FitResult
@@ -84,6 +89,16 @@ class PipelineResult:
         """The fitted analytical model."""
         model: MicrofacetModel = self.analytic.model
         return model
+
+    def plot(self) -> "Figure":
+        """Draw the scan beside both fitted curves."""
+        from data_io import in_plane
+        from fitting.report.fit_files import calibrated
+        from pbrdf.plots import scan_figure
+
+        fit = self.monte_carlo
+        scan = calibrated(fit, next(iter(fit.models)), float("nan"), self.measurement)
+        return scan_figure(in_plane(scan), self.curves)
 
 
 def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole way)
@@ -137,12 +152,12 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
         If the scan holds several wavelengths, or nothing that the fit can use.
     """
     check_seed(seed)
-    index = Material(*material.index(_wavelength(measurement)), name=material.name)
-    clock = _Clock(progress or (lambda *_: None))
+    index = Material(*material.index(one_wavelength(measurement)), name=material.name)
+    clock = Clock(progress or (lambda *_: None))
 
     with clock.stage("surface statistics"):
         statistics = surface_statistics(surface, form=form)
-    free, priors = _slope_knowledge(statistics, free)
+    free, priors = slope_knowledge(statistics, free)
 
     bring = partial(fit, mask=mask, accept=accept)
     start = MicrofacetModel(
@@ -171,6 +186,7 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
                 scan_slope = bring(measurement, curve, free=wider)
 
     return PipelineResult(
+        surface=surface,
         statistics=statistics,
         measurement=measurement,
         analytic=analytic,
@@ -242,7 +258,7 @@ def _simulated(
     )
 
 
-def _slope_knowledge(
+def slope_knowledge(
     statistics: SurfaceStatistics, free: Sequence[str]
 ) -> tuple[tuple[str, ...], dict[str, tuple[float, float]]]:
     """Return what to fit and what the surface tells of the slope.
@@ -255,7 +271,7 @@ def _slope_knowledge(
     return tuple(dict.fromkeys((*free, "slope_rms"))), {}
 
 
-def _wavelength(measurement: xr.Dataset) -> float | None:
+def one_wavelength(measurement: xr.Dataset) -> float | None:
     """Return the one wavelength of the scan, None if it names none. [um]"""
     if "wavelength" not in measurement.coords:
         return None
@@ -299,7 +315,7 @@ def _beyond_optics(
     measurement: xr.Dataset, statistics: SurfaceStatistics
 ) -> tuple[str, ...]:
     """Name where geometric optics fails on this surface at the wavelength of the scan."""
-    wavelength = _wavelength(measurement)
+    wavelength = one_wavelength(measurement)
     if wavelength is None:
         return ()
     rough = roughness_of(random_surface(statistics, statistics.slope_rms.value))
@@ -307,7 +323,7 @@ def _beyond_optics(
 
 
 @dataclass
-class _Clock:
+class Clock:
     """Elapsed time by stage. [s]"""
 
     report: Progress

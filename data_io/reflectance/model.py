@@ -14,32 +14,15 @@ from pbrdf.files import complete_file, read_toml
 if TYPE_CHECKING:
     from pbrdf.analytic import MicrofacetModel
 
-__all__ = ["read_model", "write_model"]
+__all__ = ["model_text", "read_model", "write_model"]
 
 # In the file an angle carries its unit, and so is in degrees
 _ANGLES = ("shadow_omega", "shadow_tau")
 _MATERIAL_KEYS = {"n", "kappa", "name"}
 
 
-def write_model(
-    model: "MicrofacetModel", path: str | Path, *, notes: Mapping[str, Any] | None = None
-) -> None:
-    """Write a model with a constant index, and beside it what else should be remembered.
-
-    Parameters
-    ----------
-    model : MicrofacetModel
-        Its material must be constant: a fit holds at its wavelength.
-    path : str or Path
-        The file; appears whole or not at all.
-    notes : mapping, optional
-        Further tables of the file, such as uncertainties; `read_model` leaves them alone.
-
-    Raises
-    ------
-    ValueError
-        If the index or the slope distribution is tabulated.
-    """
+def model_text(model: "MicrofacetModel", notes: Mapping[str, Any] | None = None) -> str:
+    """Return the text of the file that `write_model` writes, with the same errors."""
     import tomli_w
 
     material = model.material
@@ -61,7 +44,29 @@ def write_model(
     }
     index: dict[str, Any] = {} if material.name is None else {"name": material.name}
     index |= {"n": float(material.n), "kappa": float(material.kappa)}
-    text = tomli_w.dumps({"model": table, "material": index, **(notes or {})})
+    return tomli_w.dumps({"model": table, "material": index, **(notes or {})})
+
+
+def write_model(
+    model: "MicrofacetModel", path: str | Path, *, notes: Mapping[str, Any] | None = None
+) -> None:
+    """Write a model with a constant index, and beside it what else should be remembered.
+
+    Parameters
+    ----------
+    model : MicrofacetModel
+        Its material must be constant: a fit holds at its wavelength.
+    path : str or Path
+        The file; appears whole or not at all.
+    notes : mapping, optional
+        Further tables of the file, such as uncertainties; `read_model` leaves them alone.
+
+    Raises
+    ------
+    ValueError
+        If the index or the slope distribution is tabulated.
+    """
+    text = model_text(model, notes)
     with complete_file(path) as stage:
         stage.write_text(text, encoding="utf-8")
 

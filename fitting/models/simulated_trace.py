@@ -29,6 +29,12 @@ __all__ = ["Trace", "group_count", "interpolate_bins", "merged", "trace"]
 _GROUPS, _FEWEST = 16, 8
 # Below this share of the analytical curve's own error a bin's count speaks for itself
 _TRUSTED = 0.5
+# What independent runs have together
+_COUNTS = {
+    "realizations", "ray_batches", "rays_per_direction", "path_segments", "rays_escaped",
+    "rays_truncated", "rays_leaked", "rays_left_sideways", "self_hits", "exact_searches",
+    "medium_mismatches",
+}  # fmt: skip
 # Nodes of the average over a bin
 _ORDER = 4
 
@@ -188,9 +194,14 @@ def merged(runs: Sequence[xr.Dataset]) -> xr.Dataset:
             one_ray = np.sqrt((together[name] ** 2).mean("run"))
             error = spread.where(spread > 0.0, one_ray) / np.sqrt(len(runs))
             result[name] = error.assign_attrs(together[name].attrs)
-    attrs = dict(runs[0].attrs)
-    attrs["realizations"] = sum(run.attrs["realizations"] for run in runs)
-    attrs["ray_batches"] = sum(run.attrs["ray_batches"] for run in runs)
+    # What one run says of its own precision does not hold for all of them
+    attrs = {k: v for k, v in runs[0].attrs.items() if k != "rel_error"}
+    for name in _COUNTS & attrs.keys():
+        counts = np.sum([run.attrs[name] for run in runs], axis=0)
+        attrs[name] = counts.tolist()
+    attrs["warnings"] = [
+        note for note in attrs["warnings"] if "too few for honest" not in note
+    ]
     result.attrs = attrs | {"independent_runs": len(runs)}
     return result
 

@@ -1,6 +1,5 @@
 """A page that explains any result: summary, hemisphere, fits, glossary, origin, data."""
 
-import base64
 import shlex
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
@@ -11,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fitting.report import html
+from fitting.report.layers import fitted_layers, layers_of, light, with_readings
 from fitting.report.viewer import hemisphere_view
 from fitting.result.misfit import RULE
 from pbrdf import __version__
@@ -20,6 +20,7 @@ from pbrdf.plots.sheet import scene_of
 
 __all__ = [
     "correlations",
+    "cuts",
     "facts",
     "fit_summary",
     "glossary",
@@ -67,7 +68,14 @@ def sections_of(result: xr.Dataset, name: str) -> Iterator[str]:
         sentences = [*fit_summary(fits), sentences[-1]]
     yield html.section("Summary", html.paragraph(" ".join(sentences)), facts(result, name))
     if "theta_s" in mueller(result)[0].dims:
-        yield html.section("Hemisphere", hemisphere_view(result), _download(result))
+        layers = fitted_layers(result)
+        if layers is None:
+            layers = layers_of(result)
+        else:
+            layers = with_readings(layers, scan_of(result))
+        yield html.section(
+            "Hemisphere", hemisphere_view(layers), html.download(*cuts(result))
+        )
     for title, fit in fits.items():
         yield html.section(f"{title} fit", *_fit(fit))
     notes = result.attrs.get("warnings") or []
@@ -83,8 +91,8 @@ def fit_summary(fits: Mapping[str, Mapping[str, Any]]) -> list[str]:
     answer = fits[title]
     verdict = answer["misfit"]["verdict"]
     said = [
-        f"The {title} curve follows the scan with the verdict “{verdict}”, over "
-        f"{answer['dof']} degrees of freedom, by the rule below."
+        f"The {title} curve follows the scan with the verdict “{verdict}”: {_why(answer)} "
+        f"({answer['dof']} degrees of freedom; the rule stands below)."
     ]
     values = ", ".join(
         f"{name} {_estimate(one)}" for name, one in answer["parameters"].items()
@@ -103,6 +111,21 @@ def fit_summary(fits: Mapping[str, Mapping[str, Any]]) -> list[str]:
             f"formula: {other}."
         )
     return said
+
+
+def _why(fit: Mapping[str, Any]) -> str:
+    """Return how far the readings lie from the curve."""
+    size = [
+        ("median_deviation", 100, "half of the readings are off by more than {:.2g} %"),
+        ("worst_deviation", 100, "the worst by {:.2g} %"),
+        ("rms_in_stderr", 1, "the residuals are {:.2g} standard errors rms"),
+    ]
+    said = [
+        words.format(factor * fit["misfit"][name])
+        for name, factor, words in size
+        if fit["misfit"].get(name) is not None
+    ]
+    return ", ".join(said) or "its size is not known"
 
 
 def facts(result: xr.Dataset, name: str) -> str:
@@ -152,19 +175,17 @@ def origin(record: Any, result: xr.Dataset | None = None) -> str:
         (one["role"], one["name"], one.get("sha256", "an entry of a database"))
         for one in record["inputs"]
     ]
-    words = ["pbrdf", str(record["command"])]
-    words += [one["name"] for one in record["inputs"] if one["role"] != "material"]
-    for key, value in record["options"].items():
-        option = f"--{key.replace('_', '-')}"
-        if isinstance(value, bool):
-            words += [option] if value else []
-        else:
-            words += [option, str(value)]
+    told = html.bullets(f"{name}: {value}" for name, value in record["options"].items())
+    if record.get("typed"):
+        told = f"<pre>{escape(shlex.join(map(str, record['typed'])))}</pre>"
     return html.section(
         "How to make it again",
         html.table(("input", "file", "SHA-256"), files),
-        f"<pre>{escape(shlex.join(words))}</pre>",
-        html.paragraph(f"Made by {record['program']}. Options by their names in Python."),
+        told,
+        html.paragraph(
+            f"Made by {record['program']}, command {record['command']}. The inputs are "
+            "those with the hashes above."
+        ),
     )
 
 
@@ -181,7 +202,7 @@ def _how_sure(result: xr.Dataset) -> str:
     if one.stderr is None:
         return "The result holds no errors."
     lit = (one.value > 0.1 * float(one.value.max())).values
-    part = 100 * (one.stderr.values / one.value.values)[lit]
+    part = 100 * one.stderr.values[lit] / one.value.values[lit]
     return (
         f"Above a tenth of its peak M00 is known to {np.nanmedian(part):.2g} % in "
         f"the median bin and {np.nanmax(part):.2g} % in the worst (one standard error)."
@@ -204,12 +225,32 @@ def _fit(fit: Mapping[str, Any]) -> Iterator[str]:
     yield html.bullets(map(str, fit["warnings"]))
 
 
-def _download(result: xr.Dataset) -> str:
-    """Return a link that holds the cuts in the plane as a table."""
-    table = in_plane(result)
-    columns = {
-        n: element(table, n).value for n in ("M00", "M10", "M20") if _holds(table, n)
-    }
+def scan_of(result: xr.Dataset) -> xr.Dataset | None:
+    """Return the scan in the plane that a pipeline's result holds, None where it has none.
+
+    A relative scan is left out: its scale belongs to a fit.
+    """
+    names = [str(n) for n in result.data_vars if str(n).startswith("scan_")]
+    fit = result.attrs.get("monte_carlo_fit")
+    relative = isinstance(fit, Mapping) and any(
+        name.startswith(("scale", "background")) for name in fit["parameters"]
+    )
+    if not names or relative:
+        return None
+    scan = result[names].rename({name: name.removeprefix("scan_") for name in names})
+    angles = [n for n in ("theta_i", "theta_s", "dphi", "phi_i") if n in scan]
+    return in_plane(scan.drop_vars("theta_view", errors="ignore").set_coords(angles))
+
+
+def cuts(result: xr.Dataset) -> tuple[str, str, str]:
+    """Return name, text and words of a table of the cuts in the plane."""
+    value, stderr = mueller(result)
+    table = in_plane(light(value, stderr))
+    columns = {}
+    for name in [n for n in ("M00", "M10", "M20") if _holds(table, n)]:
+        columns[name], error = element(table, name)
+        if error is not None:
+            columns[f"{name}_stderr"] = error
     frame = xr.Dataset(columns).to_dataframe().reset_index()
     for angle in [c for c in ("theta_i", "theta_view", "phi_i") if c in frame]:
         frame[angle] = np.rad2deg(frame[angle])
@@ -220,10 +261,10 @@ def _download(result: xr.Dataset) -> str:
         }
     )  # fmt: skip
     text = frame.to_csv(index=False, float_format="%.6g")
-    data = base64.b64encode(text.encode()).decode("ascii")
     return (
-        f'<p><a download="in_plane.csv" href="data:text/csv;base64,{data}">Download the '
-        "cuts in the plane of incidence (CSV)</a></p>"
+        "in_plane.csv",
+        text,
+        "Download the simulation in the plane of incidence (CSV)",
     )
 
 

@@ -9,7 +9,21 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["bullets", "figure", "page", "paragraph", "png", "section", "table"]
+__all__ = [
+    "bullets",
+    "download",
+    "figure",
+    "page",
+    "paragraph",
+    "png",
+    "section",
+    "table",
+]
+
+# Of figures that are embedded [dots an inch], and how wide an inch is shown [px]: letters
+# of 7 pt, the smallest of a figure, are then 12 px high
+_DPI = 200
+_INCH = 124
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
@@ -19,15 +33,17 @@ h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid #ddd;
          min-width: 4rem; vertical-align: top; }
-th { font-weight: 600; } figure { margin: 1rem 0; } img, canvas { max-width: 100%; }
+th { font-weight: 600; } figure { margin: 1rem 0; }
 figcaption, .note { color: #444; font-size: 15px; }
 pre { font-size: 14px; white-space: pre-wrap; background: #f4f4f4; padding: .6rem; }
 .viewer { display: flex; flex-wrap: wrap; gap: 1rem; align-items: center; }
-#disc { touch-action: pan-y; cursor: crosshair; }
+#disc, #cut { touch-action: pan-y; cursor: crosshair; }
 .controls label { display: inline-block; margin: 0 1rem .5rem 0; }
-select { font: inherit; max-width: 100%; } #value { font-weight: 600; min-height: 3em; }
+select, button { font: inherit; max-width: 100%; }
+#value { font-weight: 600; min-height: 3em; }
 @media print {
-  body { max-width: none; margin: 0; } .controls { display: none; }
+  body { max-width: none; margin: 0; } .controls, button { display: none; }
+  img { max-width: 100%; height: auto; }
   h2 { break-after: avoid; } table, figure, .viewer { break-inside: avoid; }
 }
 """
@@ -75,14 +91,26 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def png(drawing: "Figure") -> bytes:
     """Return a matplotlib figure as the bytes of a PNG file."""
     buffer = BytesIO()
-    drawing.savefig(buffer, format="png", dpi=140)
+    drawing.savefig(buffer, format="png", dpi=_DPI)
     return buffer.getvalue()
 
 
 def figure(image: bytes, caption: str) -> str:
-    """Return a PNG embedded with its caption."""
+    """Return a PNG of `png` embedded with its caption; on a small screen it scrolls."""
     data = base64.b64encode(image).decode("ascii")
+    # Bytes 16 to 19 of a PNG are its width
+    width = int.from_bytes(image[16:20]) * _INCH // _DPI
     return (
-        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{data}">'
+        f'<figure><div class="wide"><img alt="{escape(caption)}" style="width:{width}px" '
+        f'src="data:image/png;base64,{data}"></div>'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )
+
+
+def download(name: str, text: str, words: str) -> str:
+    """Return a link that holds a text as a file."""
+    data = base64.b64encode(text.encode()).decode("ascii")
+    return (
+        f'<p><a download="{escape(name)}" href="data:text/plain;base64,{data}">'
+        f"{escape(words)}</a></p>"
     )

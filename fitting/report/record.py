@@ -1,7 +1,7 @@
 """What a result needs to be had again: inputs and their hashes, options, version."""
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ def record_of(
     *,
     command: str,
     options: Mapping[str, Any],
+    typed: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Return names and SHA-256 of the inputs, the command, its options and the version.
 
@@ -28,6 +29,8 @@ def record_of(
     options : mapping of str to value
         Its options by the names that Python has for them; None, for those left out, is
         dropped.
+    typed : sequence of str, optional
+        The words of the command that makes the result again.
     """
     files = []
     for role, paths in inputs.items():
@@ -44,6 +47,7 @@ def record_of(
         "command": command,
         "inputs": files,
         "options": {name: _plain(v) for name, v in options.items() if v is not None},
+        **({"typed": list(typed)} if typed else {}),
     }
 
 

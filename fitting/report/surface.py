@@ -1,40 +1,104 @@
 """What a measured surface looks like, and what was found in it."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from data_io.micrograph.levels import load_grey
 from fitting.statistics.slopes import slope_distribution
 from pbrdf.plots import COLOURS, new_figure
+from pbrdf.plots.sheet import halo, small, width
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from data_io import EdgeProfile
     from fitting.statistics.result import SurfaceStatistics
 
-__all__ = ["surface_figure"]
+__all__ = ["edge_figure", "surface_figure"]
+
+_GOOD, _POOR = (0.1, 0.9, 0.2), (1.0, 0.1, 0.1)
 
 
-def surface_figure(surface: Any, found: "SurfaceStatistics") -> "Figure":
+def surface_figure(
+    surface: Any, found: "SurfaceStatistics", *, width_mm: float = 170.0
+) -> "Figure":
     """Draw a surface with its scale, what was mended, and its statistics.
 
     Six panels: the map (form taken off) with a scale bar, or the profile; what was mended,
     or the height distribution of a sound surface; autocorrelation with its fit; power
     spectrum with its model; slope distribution with error bars; slope against cut-off.
+
+    Parameters
+    ----------
+    surface : Profile or HeightMap
+        What was measured.
+    found : SurfaceStatistics
+        Of it.
+    width_mm : float
+        Width that the figure is printed at; below 115 mm it has two columns. [mm]
     """
-    figure, axes = new_figure(2, 3, (13.0, 7.4))
-    _draw_surface(axes[0, 0], found)
+    from matplotlib import rc_context
+
     mends = [one for one in getattr(surface, "mends", ()) if one.kind != "terraces"]
-    if mends:
-        _draw_mends(axes[0, 1], surface, mends)
-    else:
-        _draw_heights(axes[0, 1], found)
-    _draw_autocorrelation(axes[0, 2], found)
-    if found.height_rms.value > 0:
-        _draw_spectrum(axes[1, 0], found)
-        _draw_slopes(axes[1, 1], surface, found)
-        _draw_bands(axes[1, 2], found)
+    inches = width(width_mm)
+    rows, columns = (2, 3) if inches > 4.5 else (3, 2)
+    with rc_context(small()):
+        figure, axes = new_figure(rows, columns, (inches, rows * 1.95))
+        panels = iter(axes.flat)
+        _draw_surface(next(panels), found)
+        if mends:
+            _draw_mends(next(panels), surface, mends)
+        else:
+            _draw_heights(next(panels), found)
+        _draw_autocorrelation(next(panels), found)
+        if found.height_rms.value > 0:
+            _draw_spectrum(next(panels), found)
+            _draw_slopes(next(panels), surface, found)
+            _draw_bands(next(panels), found)
+        for empty in panels:
+            empty.set_visible(False)
+        figure.draw_without_rendering()
+    return figure
+
+
+def edge_figure(
+    picture: "str | Path", edge: "EdgeProfile", *, width_mm: float = 170.0
+) -> "Figure":
+    """Draw a micrograph with the edge that was read from it and a scale bar.
+
+    Green where the edge is well seen, red where it is poor.
+    """
+    from matplotlib import rc_context
+
+    grey, _ = load_grey(picture)
+    with rc_context(small()):
+        inches = width(width_mm)
+        rows, columns = grey.shape
+        figure, axes = new_figure(1, 1, (inches, max(1.2, 0.97 * inches * rows / columns)))
+        axis = axes[0, 0]
+        axis.imshow(grey, cmap="gray", vmin=0, vmax=1, interpolation="antialiased")
+        sound = edge.quality[
+            np.linspace(0, edge.size - 1, len(edge.pixels)).round().astype(int)
+        ]
+        axis.scatter(
+            edge.pixels[:, 1], edge.pixels[:, 0], s=1.2, linewidths=0,
+            c=np.where(sound[:, None] > 0.5, _GOOD, _POOR),
+        )  # fmt: skip
+        axis.axis("off")
+        length = _round_length(columns * edge.um_per_pixel / 5)
+        left, low = 0.04 * columns, 0.94 * rows
+        axis.plot(
+            [left, left + length / edge.um_per_pixel], [low, low], color="white",
+            linewidth=3, path_effects=halo("black", 4.5),
+        )  # fmt: skip
+        axis.text(
+            left, low - 0.025 * rows, f"{length:g} µm", color="white", va="bottom",
+            path_effects=halo("black"),
+        )  # fmt: skip
+        figure.draw_without_rendering()
     return figure
 
 
@@ -60,7 +124,7 @@ def _draw_surface(axis: "Axes", found: "SurfaceStatistics") -> None:
     axis.plot([left, left + length], [low, low], color="white", linewidth=3)
     axis.text(
         left + length / 2, low + 0.02 * size[1], f"{length:g} um", color="white",
-        ha="center", va="bottom", fontsize="small",
+        ha="center", va="bottom",
     )  # fmt: skip
 
 
@@ -91,7 +155,7 @@ def _draw_heights(axis: "Axes", found: "SurfaceStatistics") -> None:
     x = np.linspace(histogram.edges[0], histogram.edges[-1], 300)
     axis.plot(x, histogram.gaussian(x), color=COLOURS[1], label="Gaussian")
     axis.set(xlabel="height [um]", ylabel="density [1/um]", title="heights")
-    axis.legend(frameon=False, fontsize="small")
+    axis.legend(frameon=False)
 
 
 def _draw_autocorrelation(axis: "Axes", found: "SurfaceStatistics") -> None:
@@ -102,7 +166,7 @@ def _draw_autocorrelation(axis: "Axes", found: "SurfaceStatistics") -> None:
         axis.plot(curve.lag, curve.fitted, color=colour, label=curve.form)
     axis.axhline(np.exp(-1), color="grey", linewidth=0.8, linestyle=":")
     axis.set(xlabel="lag [um]", ylabel="autocorrelation [1]", title="autocorrelation")
-    axis.legend(frameon=False, fontsize="small")
+    axis.legend(frameon=False)
 
 
 def _draw_spectrum(axis: "Axes", found: "SurfaceStatistics") -> None:
@@ -119,29 +183,28 @@ def _draw_spectrum(axis: "Axes", found: "SurfaceStatistics") -> None:
         axis.axvline(1 / one.cutoff, color=colour, linewidth=0.8, linestyle=":")
     axis.set(
         xlabel="spatial frequency [1/um]", ylabel="one-sided spectrum [um3]",
-        title="spectrum; dotted: what is resolved",
+        title="spectrum; dotted: resolved",
     )  # fmt: skip
-    axis.legend(frameon=False, fontsize="small")
+    axis.legend(frameon=False)
 
 
 def _draw_slopes(axis: "Axes", surface: Any, found: "SurfaceStatistics") -> None:
-    # The table holds the rms without noise and rounding
+    # The table, and so the model, holds the rms without noise and rounding
     table = {one.axis: one.slope_rms.value for one in found.axes}
     slopes = slope_distribution(surface)
     middle = (slopes.edges[1:] + slopes.edges[:-1]) / 2
     for colour, (name, density) in zip(COLOURS, slopes.density.items(), strict=False):
         axis.errorbar(
-            middle, density, slopes.stderr[name], color=colour, fmt=".", markersize=3,
-            elinewidth=0.8, label=f"along {name}, rms {slopes.rms[name]:.3g}, of the table "
-            f"{table.get(name, np.nan):.3g}",
+            middle, density, slopes.stderr[name], color=colour, fmt=".", markersize=2.5,
+            elinewidth=0.7, label=f"{name} measured, rms {slopes.rms[name]:.3g}",
         )  # fmt: skip
-        gauss = np.exp(-0.5 * (middle / max(slopes.rms[name], 1e-12)) ** 2)
-        axis.plot(
-            middle, gauss / (np.sqrt(2 * np.pi) * max(slopes.rms[name], 1e-12)),
-            color=colour, linewidth=0.8,
-        )  # fmt: skip
-    axis.set(xlabel="slope [1]", ylabel="density [1]", title="slopes as measured")
-    axis.legend(frameon=False, fontsize="small")
+        rms = table.get(name, np.nan)
+        if rms > 0:
+            gauss = np.exp(-0.5 * (middle / rms) ** 2) / (np.sqrt(2 * np.pi) * rms)
+            axis.plot(middle, gauss, "--", color=colour, label=f"model, rms {rms:.3g}")
+    axis.set(xlabel="slope [1]", ylabel="density [1]", title="slopes, noise included")
+    axis.set_ylim(0, 1.45 * axis.get_ylim()[1])
+    axis.legend(frameon=False, loc="upper right")
 
 
 def _draw_bands(axis: "Axes", found: "SurfaceStatistics") -> None:
@@ -158,7 +221,7 @@ def _draw_bands(axis: "Axes", found: "SurfaceStatistics") -> None:
             bands.cutoff[known], low[known], high[known], color=colour, alpha=0.2
         )
     axis.set(
-        xlabel="shortest wavelength counted [um]", ylabel="slope rms [1]",
+        xlabel="shortest wavelength [um]", ylabel="slope rms [1]",
         title="slope against cut-off",
     )  # fmt: skip
-    axis.legend(frameon=False, fontsize="small")
+    axis.legend(frameon=False)

@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 import data_io
+from data_io.reflectance.model import model_text
 from fitting.estimate import Estimate
 from fitting.report import explorer, html
+from fitting.report.downloads import download_links
 from fitting.report.fit_files import calibrated
+from fitting.report.layers import Layers, fitted_layers, layers_of, with_readings
+from fitting.report.surface import edge_figure, surface_figure
 from fitting.report.viewer import hemisphere_view
 from fitting.result.misfit import RULE
 from pbrdf import __version__
-from pbrdf.plots import histograms, scan_figure
+from pbrdf.plots import scan_figure
 
 if TYPE_CHECKING:
     from fitting.pipeline import PipelineResult
@@ -29,6 +33,7 @@ def write_report(
     inputs: Mapping[str, str] | None = None,
     seconds: Mapping[str, float] | None = None,
     record: Mapping[str, Any] | None = None,
+    picture: Path | None = None,
 ) -> None:
     """Write model.toml, result.nc, the figures and report.html into a folder.
 
@@ -44,13 +49,17 @@ def write_report(
         Time of what came before the pipeline. [s]
     record : mapping, optional
         What it takes to repeat the run, see `fitting.report.record`.
+    picture : Path, optional
+        The micrograph that the surface was read from, to draw its edge into.
     """
     figures = {
-        "surface.png": html.png(histograms(result.statistics.histograms())),
+        "surface.png": html.png(surface_figure(result.surface, result.statistics)),
         "scan.png": html.png(
             scan_figure(data_io.in_plane(_in_units(result)), result.curves)
         ),
     }
+    if picture is not None and isinstance(result.surface, data_io.EdgeProfile):
+        figures["edge.png"] = html.png(edge_figure(picture, result.surface))
     for name, image in figures.items():
         (folder / name).write_bytes(image)
     together = result_dataset(result)
@@ -59,7 +68,10 @@ def write_report(
     data_io.write_result(together, folder / "result.nc")
     data_io.write_model(result.model, folder / "model.toml", notes=_notes(result, record))
     times = {**(seconds or {}), **result.seconds}
-    sections = [*_sections(result, figures, inputs or {}, times), explorer.origin(record)]
+    sections = [
+        *_sections(result, together, figures, inputs or {}, times),
+        explorer.origin(record),
+    ]
     page = html.page("Reflectance model", [*sections, explorer.glossary()])
     (folder / "report.html").write_text(page, encoding="utf-8")
 
@@ -86,6 +98,7 @@ def result_dataset(result: "PipelineResult") -> xr.Dataset:
         "statistics": result.statistics.to_dict(),
         "analytic_fit": result.analytic.as_dict(),
         "monte_carlo_fit": result.monte_carlo.as_dict(),
+        "analytic_model": model_text(result.model),
     }
     return together
 
@@ -140,6 +153,7 @@ def _plain(estimate: Estimate) -> dict[str, object]:
 
 def _sections(
     result: "PipelineResult",
+    together: xr.Dataset,
     figures: Mapping[str, bytes],
     inputs: Mapping[str, str],
     seconds: Mapping[str, float],
@@ -165,15 +179,21 @@ def _sections(
             f"Heights: {statistics.gaussianity.verdict}."
         ),
         html.bullets(statistics.warnings),
+        *(
+            html.figure(figures["edge.png"], "The edge as it was read.")
+            for _ in range("edge.png" in figures)
+        ),
         html.figure(
-            figures["surface.png"], "Heights and slopes, and Gaussians of their rms."
+            figures["surface.png"],
+            "The surface without its form, its heights, autocorrelation with the fit, "
+            "spectrum with its model, slopes with the model's, slope by the cut-off.",
         ),
     )
     yield _model_section(fits, figures["scan.png"])
     yield html.section(
         "Hemisphere",
-        html.paragraph("The simulation, for a specular gain of 1 and no diffuse part."),
-        hemisphere_view(result.simulation),
+        hemisphere_view(_layers(result, together)),
+        *download_links(result, _notes(result, None)),
     )
     yield html.section("What these data cannot tell", html.bullets(result.unknown))
     yield html.section(
@@ -222,6 +242,14 @@ def _model_section(fits: "dict[str, FitResult]", scan: bytes) -> str:
             "the scan gives errors; grey: two of them.",
         ),
     )
+
+
+def _layers(result: "PipelineResult", together: xr.Dataset) -> Layers:
+    layers = fitted_layers(together)
+    if layers is None:
+        # The values belong to an index or parameters that were not traced alone
+        return layers_of(result.simulation)
+    return with_readings(layers, data_io.in_plane(_in_units(result)))
 
 
 _SHOWN = ("n_rays", "realizations", "seed", "max_bounces", "version")

@@ -11,10 +11,12 @@ from scipy import stats
 from fitting.estimate import Estimate
 from fitting.result.misfit import Misfit, misfit_of
 from fitting.result.tables import held_values, parameter_frame
+from pbrdf.notebook import table
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.figure import Figure
 
     from fitting.objective.parameters import Parameter
     from fitting.problem.problem import Problem
@@ -260,6 +262,26 @@ class FitResult:
         """Schwarz's information criterion."""
         k, m = len(self.values) + self.n_estimated, len(self.residuals)
         return k * np.log(m) - 2.0 * self.log_likelihood
+
+    def _repr_html_(self) -> str:
+        rows = [(name, str(e)) for name, e in {**self.estimates, **self.ratios}.items()]
+        rows.append(("misfit", str(self.misfit)))
+        if not self.n_estimated:
+            rows.append(("chi2 / dof", f"{self.chi2:.4g} / {self.dof}"))
+        rows += [("noise", self.noise), *(("warning", text) for text in self.warnings)]
+        return table("Fit", rows, ("", "value ± standard error"))
+
+    def plot(self) -> "Figure":
+        """Draw the readings in the plane of incidence beside the fitted model.
+
+        Raises
+        ------
+        ValueError
+            If no reading lies in the plane, or no quantity drawn there was read.
+        """
+        from fitting.report.readings_drawn import fit_figure
+
+        return fit_figure(self.readings)
 
     def summary(self) -> str:
         """Return the result as a few lines of text."""

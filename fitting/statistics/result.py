@@ -13,6 +13,7 @@ from fitting.statistics.gaussianity import Gaussianity
 from fitting.statistics.histogram import Histogram, make_histogram
 from fitting.statistics.random_surface import gaussian_surface, measured_surface
 from fitting.statistics.texture import Anisotropy
+from pbrdf.notebook import table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -324,6 +325,15 @@ class SurfaceStatistics:
             numbers = (_format(v) for v in (e.value, e.stderr, e.low, e.high))
             rows.append((name, units, *numbers))
         return rows  # type: ignore[return-value]
+
+    def _repr_html_(self) -> str:
+        head = ("quantity", "unit", "value", "standard error", "95 % from", "to")
+        notes = [
+            ("autocorrelation", self.autocorrelation.description),
+            ("heights", str(self.gaussianity.verdict)),
+            *(("warning", text) for text in self.warnings),
+        ]
+        return table("Surface", self.table(), head) + table("Remarks", notes)
 
     def __str__(self) -> str:
         lines = [

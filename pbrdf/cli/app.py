@@ -21,6 +21,7 @@ import typer
 from pbrdf import __version__
 from pbrdf.cli import measuring, predicting, showing
 from pbrdf.cli.progress import Talk, talk
+from pbrdf.cli.typed import remember
 from pbrdf.cli.wording import in_options, options_of
 from pbrdf.files.writing import FULL
 
@@ -107,6 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         itself is not caught. --verbose shows where an error was raised.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
+    remember(arguments)
     talk(Talk.NORMAL)
     with warnings.catch_warnings(), _ending_in_order():
         warnings.showwarning = partial(_one_line_warning, arguments)

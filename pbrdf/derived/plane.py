@@ -21,7 +21,7 @@ def in_plane(result: xr.Dataset) -> xr.Dataset:
         If the result has no directions in the plane.
     """
     about = {"units": "rad", "long_name": "view zenith, positive forward"}
-    if "geometry" in result.dims:
+    if "geometry" in result.dims and "dphi" not in result.dims:
         flat = np.abs(np.sin(result.dphi) * np.sin(result.theta_s)) < 1e-6
         result = result.isel(geometry=np.flatnonzero(flat.values))
         view = -np.sign(np.cos(result.dphi)) * result.theta_s

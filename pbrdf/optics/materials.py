@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pbrdf.errors import require
+from pbrdf.notebook import table
 from pbrdf.optics.checks import checked_kappa, checked_n
 from pbrdf.optics.dispersion import Dispersion, Table
 
@@ -137,6 +138,33 @@ class Material:
         """Whether there is a diffuse base under the interface."""
         albedo = self.diffuse_albedo
         return any(albedo.values) if isinstance(albedo, Table) else albedo > 0.0
+
+    def summary(self) -> str:
+        """Return name, index or its range, and albedo of the base, in a line.
+
+        Examples
+        --------
+        >>> Material(1.5, 0.01, diffuse_albedo=0.2, name="grey paint").summary()
+        'grey paint: n 1.5, kappa 0.01, base of albedo 0.2'
+        """
+        parts = [
+            f"{label} {'tabulated' if callable(value) else f'{value:.6g}'}"
+            for label, value in (("n", self.n), ("kappa", self.kappa))
+        ]
+        if self.has_base:
+            albedo = self.diffuse_albedo
+            known = "tabulated" if callable(albedo) else f"{albedo:.6g}"
+            parts.append(f"base of albedo {known}")
+        if self.dispersive:
+            low, high = self.valid_range
+            parts.append(f"known from {low:.4g} to {high:.4g} um")
+        text = ", ".join(parts)
+        return f"{self.name}: {text}" if self.name else text
+
+    def _repr_html_(self) -> str:
+        rows = [("constants", self.summary())]
+        rows += [("source", self.source)] if self.source else []
+        return table("Material", rows)
 
     def albedo(self, wavelength: npt.ArrayLike | None = None) -> np.ndarray:
         """Albedo of the base at vacuum wavelengths of any shape [um].

@@ -6,12 +6,11 @@ drawn. Each function returns a matplotlib Figure that belongs to no window syste
 """
 
 from pbrdf.plots.cuts import plane_cuts
-from pbrdf.plots.densities import histograms
 from pbrdf.plots.polar import hemisphere
 from pbrdf.plots.scans import scan_figure
 from pbrdf.plots.sheet import COLOURS, WIDTHS, new_figure
 
 __all__ = [
-    "COLOURS", "WIDTHS", "hemisphere", "histograms", "new_figure", "plane_cuts",
+    "COLOURS", "WIDTHS", "hemisphere", "new_figure", "plane_cuts",
     "scan_figure",
 ]  # fmt: skip

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from pbrdf.plots.sheet import COLOURS, new_figure
+from pbrdf.plots.sheet import COLOURS, SIZE, new_figure, small, width
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,11 +23,15 @@ _MODELS = {
 }
 # A taller sheet than this many panels is cut, and says so
 _MOST = 12
+# A sheet wider than this has a column for each quantity [in]
+_WIDE = 4.5
 # Residuals beyond this are drawn logarithmically, with their sign
 _FAR = 20.0
 
 
-def scan_figure(measured: xr.Dataset, curves: xr.Dataset | None = None) -> "Figure":
+def scan_figure(
+    measured: xr.Dataset, curves: xr.Dataset | None = None, *, width_mm: float = 170.0
+) -> "Figure":
     """Draw M00, M10 and their ratio against view angle: measured, analytical, Monte Carlo.
 
     Each incidence and wavelength has its own panels. Below, what the readings show beyond
@@ -41,55 +45,65 @@ def scan_figure(measured: xr.Dataset, curves: xr.Dataset | None = None) -> "Figu
         In-plane rows with theta_view [rad], theta_i [rad] and any of the quantities.
     curves : Dataset, dims theta_i, theta_view, optional
         `analytic_*`, `monte_carlo_*` and `monte_carlo_*_stderr` of each quantity.
+    width_mm : float
+        Width that the figure is printed at; below 115 mm the quantities stand in a column.
+        [mm]
     """
-    measured, names = _with_ratio(measured)
-    names = {name: label for name, label in names.items() if name in measured}
-    panels = list(_panels(measured))
-    left_out = len(panels) - _MOST
-    if left_out > 0:
-        keep = np.linspace(0, len(panels) - 1, _MOST).round().astype(int)
-        panels = [panels[k] for k in keep]
-    per = 1 if curves is None else 2
-    heights = [2.2, 1.25][:per] * len(panels)
-    figure, axes = new_figure(
-        per * len(panels), len(names), (3.7 * len(names) + 0.4, sum(heights) + 0.6),
-        height_ratios=heights,
-    )  # fmt: skip
-    for number, (title, scan) in enumerate(panels):
-        curve = None
-        if curves is not None:
-            angle = float(scan.theta_i.values[0])
-            curve = curves.sel(theta_i=angle, method="nearest", tolerance=1e-6)
-        for column, (name, label) in enumerate(names.items()):
-            upper = axes[per * number, column]
-            if curve is not None:
-                _draw_curves(upper, name, curve)
-                _draw_residuals(axes[per * number + 1, column], name, scan, curve)
-            _draw_points(upper, name, scan)
-            upper.set_title(f"{label}, {title}", fontsize="medium")
-            if name == "M00" and _spans_decades(scan[name].values):
-                upper.set_yscale("log")
-    for axis in axes.flat:
-        axis.set(xlim=(-90, 90), xticks=range(-90, 91, 30))
-    for axis in axes[-1]:
-        axis.set_xlabel("view angle [deg], + forward")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside upper center", ncols=4, frameon=False,
-        fontsize="small",
-    )  # fmt: skip
-    missing = [n for n in _QUANTITIES if n not in names and n != "m10"]
-    _note(figure, missing, left_out)
+    from matplotlib import rc_context
+
+    with rc_context(small()):
+        figure = _drawn(measured, curves, width(width_mm))
+        figure.draw_without_rendering()
     return figure
 
 
-def _note(figure: "Figure", missing: list[str], left_out: int) -> None:
+def _drawn(measured: xr.Dataset, curves: xr.Dataset | None, inches: float) -> "Figure":
+    measured, names = _with_ratio(measured)
+    names = {name: label for name, label in names.items() if name in measured}
+    panels = list(_panels(measured))
+    columns = len(names) if inches > _WIDE else 1
+    most = _MOST * columns // max(len(names), 1)
+    left_out = max(0, len(panels) - most)
+    if left_out:
+        keep = np.linspace(0, len(panels) - 1, most).round().astype(int)
+        panels = [panels[k] for k in keep]
+    per = 1 if curves is None else 2
+    blocks = [(*panel, name) for panel in panels for name in names]
+    rows = -(-len(blocks) // columns)
+    heights = [1.5, 0.95][:per] * rows
+    figure, axes = new_figure(
+        per * rows, columns, (inches, sum(heights) + 0.5), height_ratios=heights
+    )
+    for number, (title, scan, name) in enumerate(blocks):
+        row, column = divmod(number, columns)
+        upper = axes[per * row, column]
+        if curves is not None:
+            angle = float(scan.theta_i.values[0])
+            curve = curves.sel(theta_i=angle, method="nearest", tolerance=1e-6)
+            _draw_curves(upper, name, curve)
+            _draw_residuals(axes[per * row + 1, column], name, scan, curve)
+        _draw_points(upper, name, scan)
+        upper.set_title(f"{names[name]}, {title}")
+        if name == "M00" and _spans_decades(scan[name].values):
+            upper.set_yscale("log")
+    for axis in axes.flat:
+        axis.set(xlim=(-90, 90), xticks=range(-90, 91, 45))
+    for axis in axes[-1]:
+        axis.set_xlabel("view angle [deg], + forward")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False)
+    missing = [n for n in _QUANTITIES if n not in names and n != "m10"]
+    _note(figure, missing, left_out, len(panels))
+    return figure
+
+
+def _note(figure: "Figure", missing: list[str], left_out: int, drawn: int) -> None:
     """Say below the figure what it does not show."""
     notes = [f"not measured: {', '.join(missing)}"] if missing else []
     if left_out > 0:
-        notes.append(f"{_MOST} of {_MOST + left_out} cuts are drawn")
+        notes.append(f"{drawn} of {drawn + left_out} cuts are drawn")
     if notes:
-        figure.supxlabel("; ".join(notes), fontsize="small")
+        figure.supxlabel("; ".join(notes), fontsize=SIZE)
 
 
 def _panels(measured: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
@@ -207,4 +221,4 @@ def _draw_residuals(axis: "Axes", name: str, scan: xr.Dataset, curve: xr.Dataset
             axis.set_ylim(-top, top)
         else:
             axis.set_ylim(-max(3.0, 1.1 * far), max(3.0, 1.1 * far))
-    axis.set_ylabel(unit, fontsize="small")
+    axis.set_ylabel(unit)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pbrdf.contaminants import Drops, Film, Spheres
+from pbrdf.notebook import table
 from pbrdf.optics import library
 from pbrdf.optics.materials import Material
 from pbrdf.scene.write import write_scene
@@ -80,6 +81,13 @@ class Scene:
     def materials(self) -> tuple[Material, ...]:
         """Materials of the substrate, in the order of the labels."""
         return (self.substrate,) if isinstance(self.substrate, Material) else self.substrate
+
+    def _repr_html_(self) -> str:
+        several = enumerate(self.materials)
+        rows = [("surface", repr(self.surface))]
+        rows += [(f"substrate {k}" if k else "substrate", m.summary()) for k, m in several]
+        rows += [(type(one).__name__.lower(), repr(one)) for one in self.contaminants]
+        return table("Scene", rows)
 
     def to_toml(self, path: str | Path | None = None) -> str:
         """TOML text of the scene, also written to `path` if given.

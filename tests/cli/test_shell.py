@@ -6,15 +6,20 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import typer
+import xarray as xr
+from numpy.testing import assert_allclose
 
 import data_io
 from pbrdf import Material, MicrofacetModel, load_scene
 from pbrdf.cli import app, main
+from pbrdf.cli.converted import in_convention
 from pbrdf.cli.progress import StageBars, Talk, talk
 from pbrdf.cli.showing.init import Kind
 from pbrdf.cli.wording import in_options, options_of
+from pbrdf.optics.exchange import convert_brdf
 
 
 @pytest.mark.parametrize("name", app.COMMANDS)
@@ -134,3 +139,39 @@ def test_shell_completion_is_offered():
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert "complete" in run.stdout.lower() or "complete" in run.stderr.lower()
+
+
+@pytest.mark.parametrize("convention", ["scatmech", "mitsuba", "paper"])
+def test_a_table_in_another_convention_holds_its_signs(convention, tmp_path, capsys):
+    model = MicrofacetModel(Material(1.37, 7.62), slope_rms=(0.2, 0.35))
+    data_io.write_model(model, tmp_path / "m.toml")
+    words = ["export", str(tmp_path / "m.toml"), "-o", str(tmp_path / "t.csv"),
+             "--theta-i-deg", "35", "--convention", convention]  # fmt: skip
+    assert main(words) == 0
+    table = pd.read_csv(tmp_path / "t.csv", comment="#").sample(40, random_state=1)
+    names = [f"{convention}_M{i}{j}" for i in range(4) for j in range(4)]
+    theirs = table[names].to_numpy().reshape(-1, 4, 4)
+    angles = np.deg2rad(table[["theta_i_deg", "theta_s_deg", "phi_deg"]].to_numpy()).T
+    ours, dphi = convert_brdf(theirs, *angles, source=convention)
+    expected = model.brdf(angles[0], angles[1], dphi)
+    assert_allclose(ours, expected, rtol=1e-5, atol=1e-7 * expected.max())
+    # Nobody takes the table for one of this package
+    assert main(["plot", str(tmp_path / "t.csv")]) == 2
+    assert main([*words[:3], str(tmp_path / "m.pbsdf"), *words[4:]]) == 2
+    assert "--convention must be left out" in capsys.readouterr().err
+
+
+def test_errors_turn_with_the_frame():
+    # One element known to 0.1: in a turned frame the same error spreads over four
+    names = [f"M{i}{j}" for i in range(4) for j in range(4)]
+    rows = xr.Dataset(
+        {n: ("geometry", [1.0]) for n in names}
+        | {f"{n}_stderr": ("geometry", [0.1 if n == "M10" else 0.0]) for n in names},
+        {"theta_i": ("geometry", [0.5]), "theta_s": ("geometry", [0.9]),
+         "dphi": ("geometry", [2.2])},
+    )  # fmt: skip
+    found = in_convention(rows, "mitsuba").iloc[0]
+    parts = [found[f"mitsuba_{n}_stderr"] for n in ("M10", "M20")]
+    assert_allclose(np.hypot(*parts), 0.1, rtol=1e-12)
+    assert min(parts) > 0.005
+    assert found["mitsuba_M00_stderr"] == 0.0

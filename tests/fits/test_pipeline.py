@@ -1,15 +1,19 @@
 """The whole way on a small example, through the command as a user types it."""
 
+import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose
 
 import data_io
+from fitting.report.layers import fitted_layers
 from pbrdf import Material, MicrofacetModel
 from pbrdf.cli import main
+from tests.pictures.browser import asked, assert_sound
 
 SLOPE, CORR_LENGTH, GAIN, DIFFUSE = 0.2, 8.0, 0.7, 0.1
 FEW = ["--n-rays", "20000", "--realizations", "12"]
@@ -97,8 +101,61 @@ def test_the_report_needs_no_other_file(finished: Path) -> None:
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
     for word in ("specular_gain", "slope_rms", "chi2 / dof", "Monte Carlo", "seconds"):
         assert word in page
+    for name in ("curves.csv", "readings.csv", "in_plane.csv", "model.toml"):
+        assert f'download="{name}"' in page
     # A number of the fits never stands without its error
     assert re.search(r"specular_gain</td><td>0\.\d+ ± 0\.\d+", page)
+
+
+def test_the_page_of_the_result_is_that_of_the_pipeline(finished: Path, tmp_path) -> None:
+    held = []
+    assert main(["report", str(finished / "out"), "-o", str(tmp_path / "r.html")]) == 0
+    for file in (finished / "out" / "report.html", tmp_path / "r.html"):
+        page = file.read_text()
+        held.append(re.search(r'id="hemisphere-data">(.*?)</script>', page, re.S)[1])
+    first, second = map(json.loads, held)
+    readings = [one.pop("readings") for one in (first, second)]
+    assert first == second
+    assert len(readings[0][0]["M00"]) == len(readings[1][0]["M00"]) > 10
+
+
+def test_the_page_is_sound_in_a_browser(finished: Path, tmp_path: Path) -> None:
+    page = (finished / "out" / "report.html").read_text()
+    found = asked(page, [({"show": "Monte Carlo - model"}, 20, 40, 45, 90)], tmp_path)
+    assert_sound(found)
+    assert "M00 - model = " in found[390]["answers"][0][0]
+
+
+def test_the_hemisphere_holds_the_fitted_values(finished: Path) -> None:
+    result = data_io.read_result(finished / "out" / "result.nc")
+    layers = fitted_layers(result)
+    fit = {n: p["value"] for n, p in result.attrs["monte_carlo_fit"]["parameters"].items()}
+    expected = fit["specular_gain"] * result.brdf_total
+    expected[..., 0, 0] += fit["diffuse_albedo"] / np.pi
+    assert_allclose(layers.bounces["all"].brdf_total, expected, rtol=1e-12)
+    single = fit["specular_gain"] * result.brdf.sel(bounces="1", drop=True)
+    assert_allclose(layers.bounces["1"].brdf_total, single, rtol=1e-12)
+    model = data_io.read_model(finished / "out" / "model.toml")
+    at = {"theta_s": 20, "dphi": 7}
+    here = layers.model.brdf_total[{"theta_i": 0, **at}]
+    middle = model.brdf(float(here.theta_i), float(here.theta_s), float(here.dphi))
+    assert_allclose(here, middle[:3, :3], rtol=0.01, atol=1e-4)
+
+
+def test_the_first_look_is_the_analytical_fit(finished: Path, tmp_path: Path) -> None:
+    words = ["pipeline", str(finished / "profile.csv"), str(finished / "scan.csv"),
+             "--n", "1.5", "--quick", "-o", str(tmp_path / "look")]  # fmt: skip
+    assert main(words) == 0
+    names = sorted(path.name for path in (tmp_path / "look").iterdir())
+    assert names == ["model.toml", "report.html", "scan.png", "surface.png"]
+    first, whole = (
+        data_io.read_model(folder / "model.toml")
+        for folder in (tmp_path / "look", finished / "out")
+    )
+    assert first == whole
+    page = (tmp_path / "look" / "report.html").read_text()
+    assert "Nothing was simulated" in page
+    assert "--quick" in page
 
 
 def test_results_are_replaced_only_on_demand(

@@ -153,10 +153,11 @@ def command(
         with staged_folder(output, force=force) as stage:
             from fitting.report.fit_files import write_fit
             from fitting.report.record import record_of
+            from pbrdf.cli.typed import words_typed
 
             files = {"scan": scans, "scene": scene, "material": material_file}
             chosen = options.recorded(given)
-            record = record_of(files, command="fit", options=chosen)
+            record = record_of(files, command="fit", options=chosen, typed=words_typed())
             write_fit(result, measured, stage, record=record)
     typer.echo(result.summary())
     if not result.converged:

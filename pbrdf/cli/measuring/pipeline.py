@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -48,11 +48,15 @@ def command(
     realizations: options.Realizations = 32,
     seed: options.Seed = 0,
     workers: options.Workers = None,
+    quick: Annotated[
+        bool,
+        typer.Option("--quick", help="The analytical fit alone: a first look in seconds."),
+    ] = False,
 ) -> None:
     """Turn a measured surface and its goniometer scan into a polarised reflectance model.
 
     Writes a folder with report.html, model.toml (load it with data_io.read_model),
-    result.nc and the figures.
+    result.nc and the figures. With --quick nothing is simulated, and there is no result.nc.
 
     Example: pbrdf pipeline edge.png scan.csv --um-per-pixel 0.5 --n 1.53
     """
@@ -60,6 +64,7 @@ def command(
     from pbrdf.cli.progress import StageBars
     from pbrdf.cli.reading import read_material, read_scan, read_surface
     from pbrdf.cli.staging import staged_folder
+    from pbrdf.cli.typed import words_typed
 
     target = output or Path(f"{scan.stem}-model")
     material = _needed(read_material(n, kappa, material_file))
@@ -78,38 +83,49 @@ def command(
         measurement = read_scan(scan, wavelength=wavelength, declared=declared)
         reading = perf_counter() - begin
 
-        from fitting.pipeline import run_pipeline
         from fitting.readings.masks import blocked_detector, zeros
         from fitting.report.record import record_of
-        from fitting.report.write import write_report
 
         bars = stack.enter_context(StageBars())
+        common: dict[str, Any] = {
+            "material": material,
+            "free": options.names(free),
+            "shadowing": shadowing,
+            "form": options.form(form),
+            "mask": (zeros(), blocked_detector(blocked)) if blocked else (zeros(),),
+            "accept": options.names(accept),
+            "progress": bars.update,
+        }
+        record = record_of(
+            {"surface": surface, "scan": scan, "material": material_file},
+            command="pipeline",
+            options=options.recorded(given),
+            typed=words_typed(),
+        )
+        if quick:
+            _first_look(heights, measurement, common, stage, record, surface)
+            typer.echo(f"Report:  {target / 'report.html'}")
+            return
+        from fitting.pipeline import run_pipeline
+        from fitting.report.write import write_report
+
         result = run_pipeline(
             heights,
             measurement,
-            material=material,
-            free=options.names(free),
-            shadowing=shadowing,
-            form=options.form(form),
-            mask=(zeros(), blocked_detector(blocked)) if blocked else (zeros(),),
             n_rays=n_rays,
             realizations=realizations,
             seed=seed,
             workers=workers,
-            accept=options.names(accept),
-            progress=bars.update,
+            **common,
         )
         begin, index = perf_counter(), material_file or f"{n:g} + {kappa:g} i"
         inputs = {
             "surface": surface.name, "scan": scan.name, "index": index, "fitted": free
         }  # fmt: skip
-        record = record_of(
-            {"surface": surface, "scan": scan, "material": material_file},
-            command="pipeline",
-            options=options.recorded(given),
-        )
         seconds = {"reading": reading}
-        write_report(result, stage, inputs=inputs, seconds=seconds, record=record)
+        write_report(
+            result, stage, inputs=inputs, seconds=seconds, record=record, picture=surface
+        )
         writing = perf_counter() - begin
     for line in summary(result):
         typer.echo(line)
@@ -130,6 +146,25 @@ def _times(stages: dict[str, float]) -> str:
     """Return the seconds of each stage and of all, in one line."""
     whole = stages | {"in all": sum(stages.values())}
     return "\nSeconds: " + ", ".join(f"{name} {s:.1f}" for name, s in whole.items())
+
+
+def _first_look(
+    heights: Any,
+    measurement: Any,
+    common: dict[str, Any],
+    stage: Path,
+    record: dict[str, Any],
+    picture: Path,
+) -> None:
+    """Fit the analytical curve, write and print it."""
+    from fitting.quick import run_quick
+    from fitting.report.quick_page import write_quick
+
+    result = run_quick(heights, measurement, **common)
+    write_quick(result, stage, record=record, picture=picture)
+    typer.echo(str(result.statistics))
+    typer.echo(result.analytic.summary())
+    typer.echo("Nothing was simulated; without --quick, light of several bounces is.")
 
 
 def summary(result: "PipelineResult") -> Iterator[str]:

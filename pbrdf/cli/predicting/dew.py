@@ -97,10 +97,13 @@ def command(
 
     Example: pbrdf dew --contact-angles-deg 15,90,179 --theta-i-deg 40 -o dew
     """
+    given = dict(locals())
     import pbrdf
     from data_io import write_result
+    from fitting.report.record import record_of
     from pbrdf.cli.progress import progress_bar
     from pbrdf.cli.staging import staged_folder
+    from pbrdf.cli.typed import words_typed
     from pbrdf.dew import compare_dew
 
     if scene is None:
@@ -148,7 +151,14 @@ def command(
                         wavelength=wave,
                     )
                 )
-        write_result(_joined(results), stage / "dew.nc")
+        whole = _joined(results)
+        whole.attrs["made_by"] = record_of(
+            {"scene": scene},
+            command="dew",
+            options=options.recorded(given),
+            typed=words_typed(),
+        )
+        write_result(whole, stage / "dew.nc")
         pbrdf.Scene(surface, substrate).to_toml(stage / "model.toml")
         _write_tables_and_figures(results, stage)
     for result in results:

@@ -47,12 +47,15 @@ def command(
 
     Example: pbrdf simulate scene.toml --theta-i-deg 10,30,60 -o result.nc
     """
+    given = dict(locals())
     import numpy as np
 
     import pbrdf
     from data_io import write_result
+    from fitting.report.record import record_of
     from pbrdf.cli.progress import progress_bar
     from pbrdf.cli.staging import staged_file
+    from pbrdf.cli.typed import words_typed
 
     loaded = pbrdf.load_scene(scene)
     target_file = options.result_file(output or scene.with_suffix(".nc"))
@@ -81,6 +84,10 @@ def command(
                 fold=fold,
                 wave=wave,
             )
+        result.attrs["made_by"] = record_of(
+            {"scene": scene}, command="simulate", options=options.recorded(given),
+            typed=words_typed(),
+        )  # fmt: skip
         write_result(result, stage)
     for line in [*result.attrs["plan"], *result.attrs["explanation"]]:
         typer.echo(line)

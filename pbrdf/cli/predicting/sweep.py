@@ -61,13 +61,16 @@ def command(
 
     Example: pbrdf sweep scene.toml --vary slope_rms=0.05,0.15,0.3 --theta-i-deg 10,60
     """
+    given = dict(locals())
     import numpy as np
     import xarray as xr
 
     import pbrdf
     from data_io import write_result
+    from fitting.report.record import record_of
     from pbrdf.cli.progress import StageBars
     from pbrdf.cli.staging import staged_file
+    from pbrdf.cli.typed import words_typed
 
     axes = dict(_axis(text) for text in vary)
     combinations = list(product(*axes.values()))
@@ -106,7 +109,13 @@ def command(
             results, data_vars="minimal", coords="minimal", compat="override",
             combine_attrs="drop_conflicts",
         )  # fmt: skip
-        write_result(cast("xr.Dataset", together), stage)
+        together = cast("xr.Dataset", together).assign_attrs(
+            made_by=record_of(
+                {"scene": scene}, command="sweep", options=options.recorded(given),
+                typed=words_typed(),
+            )
+        )  # fmt: skip
+        write_result(together, stage)
     typer.echo(f"{len(scenes)} simulations: {target_file}")
 
 

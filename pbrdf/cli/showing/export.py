@@ -1,6 +1,7 @@
 """`pbrdf export`: results and models in the formats of other programs."""
 
 from collections.abc import Iterator
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +13,16 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pbrdf import MicrofacetModel
+
+
+class Convention(StrEnum):
+    """Whose signs, frames and azimuths a table has."""
+
+    pbrdf = "pbrdf"
+    scatmech = "scatmech"
+    mitsuba = "mitsuba"
+    paper = "paper"
+
 
 # Formats of meshes
 MESHES = (".glb", ".stl", ".ply")
@@ -41,11 +52,16 @@ def command(
         ),
     ] = None,
     seed: options.Seed = 0,
+    convention: Annotated[
+        Convention, typer.Option(help="Of a .csv: whose signs, frames and azimuths.")
+    ] = Convention.pbrdf,
 ) -> None:
     """Write a BRDF for a renderer or as a table, or a scene as a mesh.
 
     A table of a model has the incidences of --theta-i-deg and the hemisphere by 5 degrees;
     that of a result has the bins of the result.
+
+    With --convention the columns bear its name; `pbrdf` reads none but its own again.
 
     Of a random scene one realisation is written, that of --seed.
 
@@ -64,17 +80,23 @@ def command(
     if source.suffix not in (".nc", ".toml"):
         msg = f"source must be a result (.nc) or a model (.toml), got {source.name!r}."
         raise ValueError(msg)
+    if convention is not Convention.pbrdf and output.suffix != ".csv":
+        msg = (
+            f"--convention must be left out of {output.suffix}, which has its own, got "
+            f"{convention.value}."
+        )
+        raise ValueError(msg)
     accuracy = None
     with staged_file(output, force=force) as stage:
         if source.suffix == ".toml":
             model = data_io.read_model(source)
             if output.suffix == ".csv":
                 incidences = options.incidences(theta_i)
-                data_io.write_goniometer(model_rows(model, incidences, wavelength), stage)
+                write_table(model_rows(model, incidences, wavelength), stage, convention)
             else:
                 accuracy = data_io.export_mitsuba(model, stage, wavelength=wavelength)
         elif output.suffix == ".csv":
-            data_io.write_goniometer(as_rows(data_io.read_result(source)), stage)
+            write_table(as_rows(data_io.read_result(source)), stage, convention)
         else:
             accuracy = data_io.export_mitsuba(data_io.read_result(source), stage)
         if accuracy is not None:
@@ -83,6 +105,21 @@ def command(
     typer.echo(f"Written: {output}")
     for line in () if accuracy is None else _accuracy_lines(accuracy):
         typer.echo(line)
+
+
+def write_table(rows: "xr.Dataset", path: Path, convention: Convention) -> None:
+    """Write goniometer rows in a convention."""
+    import data_io
+
+    if convention is Convention.pbrdf:
+        data_io.write_goniometer(rows, path)
+        return
+    from pbrdf.cli.converted import in_convention
+
+    frame = in_convention(rows, convention.value)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(f"# {frame.attrs['convention']}\n")
+        frame.to_csv(file, index=False, float_format="%.8g")
 
 
 def _accuracy_lines(accuracy: "xr.Dataset") -> Iterator[str]:

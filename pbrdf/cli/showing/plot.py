@@ -25,7 +25,9 @@ class Scale(StrEnum):
 def command(
     source: Annotated[
         Path,
-        typer.Argument(help="Result (.nc) or goniometer file.", show_default=False),
+        typer.Argument(
+            help="Result (.nc), scene (.toml) or goniometer file.", show_default=False
+        ),
     ],
     output: options.Output = None,
     force: options.Force = False,
@@ -71,8 +73,9 @@ def command(
         str | None,
         typer.Option(help="Of a dew result: add the other states minus this one, as dry."),
     ] = None,
+    seed: options.Seed = 0,
 ) -> None:
-    """Draw M00, M10 and polarisation: a scan in plane, a result over the hemisphere.
+    """Draw a scan in plane, a result over the hemisphere, or a scene in space.
 
     Example: pbrdf plot result.nc --theta-i-deg 60 -o result.png
     """
@@ -96,6 +99,11 @@ def command(
                     result, names, errors=errors, minus=minus, scale=scale.value,
                     width_mm=width_mm, places=places,
                 )  # fmt: skip
+        elif source.suffix == ".toml":
+            from pbrdf import load_scene
+            from pbrdf.plots.bodies import scene_picture
+
+            figure = scene_picture(load_scene(source), width_mm=width_mm, seed=seed)
         else:
             declared = declaring.declarations(
                 columns, azimuth_of_forward, angles, quantity, normalised
@@ -106,7 +114,7 @@ def command(
             if not scan.sizes["geometry"]:
                 msg = f"{source.name} must have rows in the plane of incidence, got none."
                 raise ValueError(msg)
-            figure = scan_figure(scan)
+            figure = scan_figure(scan, width_mm=width_mm)
         figure.savefig(stage, dpi=200)
     typer.echo(f"Figure: {target}")
 
