@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pbrdf.cli import declaring, options
+from pbrdf.cli.typed import words_typed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -153,11 +154,10 @@ def command(
         with staged_folder(output, force=force) as stage:
             from fitting.report.fit_files import write_fit
             from fitting.report.record import record_of
-            from pbrdf.cli.typed import words_typed
 
             files = {"scan": scans, "scene": scene, "material": material_file}
-            chosen = options.recorded(given)
-            record = record_of(files, command="fit", options=chosen, typed=words_typed())
+            told, chosen = words_typed(), options.recorded(given)
+            record = record_of(files, command="fit", options=chosen, typed=told)
             write_fit(result, measured, stage, record=record)
     typer.echo(result.summary())
     if not result.converged:

@@ -106,32 +106,41 @@ def command(
             _first_look(heights, measurement, common, stage, record, surface)
             typer.echo(f"Report:  {target / 'report.html'}")
             return
-        from fitting.pipeline import run_pipeline
-        from fitting.report.write import write_report
-
-        result = run_pipeline(
-            heights,
-            measurement,
-            n_rays=n_rays,
-            realizations=realizations,
-            seed=seed,
-            workers=workers,
-            **common,
-        )
-        begin, index = perf_counter(), material_file or f"{n:g} + {kappa:g} i"
+        index = material_file or f"{n:g} + {kappa:g} i"
         inputs = {
             "surface": surface.name, "scan": scan.name, "index": index, "fitted": free
         }  # fmt: skip
-        seconds = {"reading": reading}
-        write_report(
-            result, stage, inputs=inputs, seconds=seconds, record=record, picture=surface
+        tracing = {
+            "n_rays": n_rays, "realizations": realizations, "seed": seed, "workers": workers
+        }  # fmt: skip
+        told = _whole_way(
+            heights, measurement, common | tracing, stage, record, surface, inputs, reading
         )
-        writing = perf_counter() - begin
-    for line in summary(result):
-        typer.echo(line)
-    stages = {"reading": reading, **result.seconds, "report": writing}
-    typer.echo(_times(stages))
+    typer.echo("\n".join(told))
     typer.echo(f"Report:  {target / 'report.html'}")
+
+
+def _whole_way(
+    heights: Any,
+    measurement: Any,
+    chosen: dict[str, Any],
+    stage: Path,
+    record: dict[str, Any],
+    picture: Path,
+    inputs: dict[str, str],
+    reading: float,
+) -> list[str]:
+    """Fit, simulate and write everything; return what to print."""
+    from fitting.pipeline import run_pipeline
+    from fitting.report.write import write_report
+
+    result = run_pipeline(heights, measurement, **chosen)
+    begin, seconds = perf_counter(), {"reading": reading}
+    write_report(
+        result, stage, inputs=inputs, seconds=seconds, record=record, picture=picture
+    )
+    stages = {**seconds, **result.seconds, "report": perf_counter() - begin}
+    return [*summary(result), _times(stages)]
 
 
 def _needed(material: "Material | None") -> "Material":

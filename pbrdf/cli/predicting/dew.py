@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pbrdf.cli import options
+from pbrdf.cli.typed import words_typed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,7 +104,6 @@ def command(
     from fitting.report.record import record_of
     from pbrdf.cli.progress import progress_bar
     from pbrdf.cli.staging import staged_folder
-    from pbrdf.cli.typed import words_typed
     from pbrdf.dew import compare_dew
 
     if scene is None:
@@ -123,40 +123,25 @@ def command(
         liquid = pbrdf.Material(water_n or 1.333, name="water")
     with staged_folder(target, force=force) as stage:
         results = []
+        amount = {
+            "volume_per_area": volume, "number_density": density * 1e-6, "sizes": sizes
+        }  # fmt: skip
         with progress_bar("tracing") as progress:
             for number, wave in enumerate(waves or [None]):
 
                 def told(done: int, total: int, number: int = number) -> None:
                     progress(number * total + done, len(waves or [None]) * total)
 
-                results.append(
-                    compare_dew(
-                        surface,
-                        substrate,
-                        angles,
-                        incidences,
-                        amount={
-                            "volume_per_area": volume,
-                            "number_density": density * 1e-6,
-                            "sizes": sizes,
-                        },
-                        water=liquid,
-                        runs=runs,
-                        seed=seed,
-                        progress=told,
-                        n_rays=n_rays,
-                        n_theta=36,
-                        n_dphi=72,
-                        workers=workers,
-                        wavelength=wave,
-                    )
-                )
+                one = compare_dew(
+                    surface, substrate, angles, incidences, amount=amount, water=liquid,
+                    runs=runs, seed=seed, progress=told, n_rays=n_rays, n_theta=36,
+                    n_dphi=72, workers=workers, wavelength=wave,
+                )  # fmt: skip
+                results.append(one)
         whole = _joined(results)
+        chosen = options.recorded(given)
         whole.attrs["made_by"] = record_of(
-            {"scene": scene},
-            command="dew",
-            options=options.recorded(given),
-            typed=words_typed(),
+            {"scene": scene}, command="dew", options=chosen, typed=words_typed()
         )
         write_result(whole, stage / "dew.nc")
         pbrdf.Scene(surface, substrate).to_toml(stage / "model.toml")
