@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from fitting.checks.unread import what_is_not_read
 from fitting.models.cuts import plane_curves
 from fitting.models.simulated import SimulatedModel
 from fitting.readings.observations import Mask
+from fitting.readings.wavelengths import one_wavelength
 from fitting.result.fit_result import FitResult
 from fitting.run import fit
 from fitting.statistics.result import SurfaceStatistics
@@ -200,7 +202,7 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
             monte_carlo=monte_carlo.model,
         ),
         unknown=(
-            *_unknown(measurement, statistics),
+            *what_is_not_read(measurement, statistics),
             *_beyond_optics(measurement, statistics),
             *analytic.warnings,
         ),
@@ -269,46 +271,6 @@ def slope_knowledge(
     if np.isfinite(slope.stderr):
         return tuple(free), {"slope_rms": (slope.value, slope.stderr)}
     return tuple(dict.fromkeys((*free, "slope_rms"))), {}
-
-
-def one_wavelength(measurement: xr.Dataset) -> float | None:
-    """Return the one wavelength of the scan, None if it names none. [um]"""
-    if "wavelength" not in measurement.coords:
-        return None
-    found = np.unique(measurement.wavelength.values)
-    found = found[np.isfinite(found)]
-    if found.size > 1:
-        listed = ", ".join(f"{value:g}" for value in found)
-        msg = (
-            f"measurement must hold one wavelength [um], got {listed}. Select one of them."
-        )
-        raise ValueError(msg)
-    return float(found[0]) if found.size else None
-
-
-def _unknown(measurement: xr.Dataset, statistics: SurfaceStatistics) -> Iterator[str]:
-    """Name what this scan and this surface cannot tell."""
-    names = {
-        str(name) for name in measurement.data_vars if not str(name).endswith("_stderr")
-    }
-    polarised = names - {"M00"}
-    if not polarised:
-        yield (
-            "Only unpolarised reflectance was measured. M10 and DOLP of both curves follow "
-            "from the index that was given; no measurement supports them. specular_gain "
-            "and diffuse_albedo are told apart by the shape of M00 alone."
-        )
-    if names == {"DOLP"}:
-        yield (
-            "Only DOLP was measured. It fixes the ratio of diffuse_albedo to "
-            "specular_gain, and neither of the two."
-        )
-    if polarised and not any("3" in name[1:] for name in polarised if name[0] == "M"):
-        yield "No element with V was measured; the circular part is a prediction."
-    if np.unique(measurement.theta_i.values.round(6)).size == 1:
-        yield "One incidence was measured; others are predictions."
-    if not np.isfinite(statistics.slope_rms.stderr):
-        yield "The surface does not determine the slope; it was fitted to the scan instead."
 
 
 def _beyond_optics(

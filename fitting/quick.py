@@ -8,8 +8,9 @@ import numpy as np
 import xarray as xr
 
 from fitting.models.cuts import plane_curves
-from fitting.pipeline import GAINS, Clock, Progress, one_wavelength, slope_knowledge
+from fitting.pipeline import GAINS, Clock, Progress, slope_knowledge
 from fitting.readings.observations import Mask
+from fitting.readings.wavelengths import one_wavelength
 from fitting.result.fit_result import FitResult
 from fitting.run import fit
 from fitting.statistics.result import SurfaceStatistics

@@ -111,7 +111,7 @@ def _check_values(scan: Scan) -> None:
             if negative.any():
                 value = values[np.argmax(negative)]
                 problem = f"expected a value >= 0, got {value:.9g}"
-                raise scan.fault(negative, name, problem, _negative_cure(name))
+                raise scan.fault(negative, name, problem, _negative_cure(name, value))
         if name.endswith(STDERR) and name.removesuffix(STDERR) not in scan.values:
             problem = f"expected a column {name.removesuffix(STDERR)} beside it, found none"
             cure = "A standard error needs its value."
@@ -125,8 +125,10 @@ def _check_values(scan: Scan) -> None:
 _LEAVE = "Leave what was not measured empty."
 
 
-def _negative_cure(name: str) -> str:
+def _negative_cure(name: str, value: float) -> str:
     """How to mend a value below zero."""
+    if set(f"{value:g}") <= {"-", "9"} or value in (-1.0, -8888.0, -1e30):
+        return f"If {value:g} marks a gap, leave the cell empty."
     if name.endswith(STDERR):
         return _LEAVE
     if name == "DOLP":

@@ -49,12 +49,13 @@ def read_pbsdf(path: str | Path) -> xr.Dataset:
     Raises
     ------
     DataFileError
-        If the file is truncated, lacks a field, or its fields do not fit together.
+        If the file is truncated, lacks a field, its fields do not fit together, or M holds
+        no number.
 
     Warns
     -----
     ConventionWarning
-        If the table is thinned.
+        If the table is thinned, or rows are left out because an element is nan or inf.
     """
     path = Path(path)
     content = read_bytes(path)
@@ -65,7 +66,8 @@ def read_pbsdf(path: str | Path) -> xr.Dataset:
         raise DataFileError(
             path, problem, "It is no polarised BSDF of an isotropic surface."
         )
-    axes = [np.asarray(fields[name], float).ravel() for name in _NEEDED[:4]]
+    with np.errstate(invalid="ignore"):
+        axes = [np.asarray(fields[name], float).ravel() for name in _NEEDED[:4]]
     table = fields["M"]
     shape = (axes[0].size, axes[1].size, axes[2].size, axes[3].size, 4, 4)
     if table.shape != shape or not all(np.isfinite(axis).all() for axis in axes):
@@ -93,12 +95,10 @@ def read_pbsdf(path: str | Path) -> xr.Dataset:
         )
         warnings.warn(msg, ConventionWarning, stacklevel=3)
     grid = HalfVectorGrid(phi_d[::step], theta_d[::step], theta_h[::step])
-    mueller = np.asarray(table[::step, ::step, ::step], float)
-    dataset = _scan(grid, waves, mueller)
-    if not dataset.sizes["geometry"]:
-        problem = "expected nodes above the horizon, found none"
-        raise DataFileError(path, problem, _DAMAGED)
-    return dataset.assign_attrs(
+    with np.errstate(invalid="ignore", over="ignore"):
+        mueller = np.asarray(table[::step, ::step, ::step], float)
+        dataset = _scan(grid, waves, mueller)
+    return _numbers_alone(path, dataset).assign_attrs(
         source=path.name,
         sha256=sha256(content).hexdigest(),
         conventions=CONVENTIONS,
@@ -116,7 +116,6 @@ def _scan(grid: HalfVectorGrid, waves: np.ndarray, table: np.ndarray) -> xr.Data
     # The frames are rotations: turning back is the transposed matrix
     own = np.swapaxes(into, -1, -2)[..., None, :, :] @ table @ out_of[..., None, :, :]
     keep = _distinct(grid) & (theta_i < _HORIZON) & (theta_s < _HORIZON)
-    keep &= np.isfinite(own).all(axis=(-1, -2, -3))
     rows = own[keep].reshape(-1, 4, 4)
     repeat = {"repeats": waves.size}
     angle = {"units": "rad"}
@@ -132,6 +131,28 @@ def _scan(grid: HalfVectorGrid, waves: np.ndarray, table: np.ndarray) -> xr.Data
         for name in ELEMENTS
     }
     return xr.Dataset(data, coords)
+
+
+def _numbers_alone(path: Path, dataset: xr.Dataset) -> xr.Dataset:
+    """Return the rows whose elements are all numbers, and say how many are not."""
+    size = dataset.sizes["geometry"]
+    if not size:
+        problem = "expected nodes above the horizon, found none"
+        raise DataFileError(path, problem, _DAMAGED)
+    known = np.isfinite(dataset.to_dataarray().values).all(axis=0)
+    if not known.any():
+        problem = f"expected numbers in M, got none at any of {size} nodes and wavelengths"
+        raise DataFileError(path, problem, _DAMAGED, column="M")
+    if known.all():
+        return dataset
+    largest = np.degrees(np.maximum(dataset.theta_i.values, dataset.theta_s.values))
+    first, last = (f(largest[~known]) for f in (np.min, np.max))
+    msg = (
+        f"{path.name}: {size - known.sum()} of {size} rows are left out, where M holds nan "
+        f"or inf; the larger zenith there is {first:.3g} to {last:.3g} degrees."
+    )
+    warnings.warn(msg, ConventionWarning, stacklevel=4)
+    return dataset.isel(geometry=np.flatnonzero(known))
 
 
 def _distinct(grid: HalfVectorGrid) -> np.ndarray:

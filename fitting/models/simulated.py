@@ -264,21 +264,26 @@ class SimulatedModel:
         return np.asarray(whole + self.model.specular_gain * lacking)
 
     def _read(self, geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
-        """Return the ratio (N,) and the coefficients (N, 16, K) at each geometry."""
-        keys = [
-            self._run.key(*angles)
-            for angles in zip(
-                geometry.theta_i.tolist(), geometry.phi_i.tolist(), strict=True
-            )
-        ]
+        """Return the ratio (N,) and the coefficients (N, 16, K) at each geometry.
+
+        Both vary slowly with the incidence: in a cone of light they are those of its axis.
+        So is the ratio with the detector's direction: averaged over bins, it would weigh
+        their noise near the zenith, where they are small. What comes by several bounces is
+        read at each ray, for its frame is that of the ray.
+        """
+        angles = (geometry.axis(name).tolist() for name in ("theta_i", "phi_i"))
+        keys = [self._run.key(*pair) for pair in zip(*angles, strict=True)]
+        axis_s, axis_dphi = geometry.axis("theta_s"), geometry.axis("dphi")
         ratio = np.empty(geometry.size)
         multiple = np.empty((geometry.size, 16, len(self._run.grid.nodes)))
         for key, found in dict(zip(keys, self._run.of(keys), strict=True)).items():
             here = np.array([other == key for other in keys])
             one = found.mean if self._group is None else found.groups[self._group]
-            ratio[here], multiple[here] = one.read(
-                geometry.theta_s[here], geometry.dphi[here]
+            multiple[here] = one.read(geometry.theta_s[here], geometry.dphi[here])[1]
+            axes, of = np.unique(
+                np.stack([axis_s[here], axis_dphi[here]]), axis=1, return_inverse=True
             )
+            ratio[here] = one.read(axes[0], axes[1])[0][of.ravel()]
         return ratio, multiple
 
 

@@ -12,31 +12,15 @@ angle; the rotation between the two is part of the average.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 
+from fitting.readings.cone_rule import FINEST, RULES, pairs
 from fitting.readings.observations import Geometry
 from pbrdf.conventions import direction, meridian_frame
 from pbrdf.errors import one_number
 
 __all__ = ["FINEST", "Aperture", "Cones", "Rays", "cones_of", "rays_through", "spacing"]
-
-# Rings, points on the outermost ring, and points an axis across the rest, ever finer
-_RULES = (
-    (2, 6, 1),
-    (3, 10, 2),
-    (4, 14, 3),
-    (6, 20, 3),
-    (8, 28, 3),
-    (12, 40, 3),
-    (16, 56, 4),
-    (24, 84, 4),
-    (36, 126, 5),
-)
-FINEST = len(_RULES) - 1
-_LEAST_AROUND = 6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +132,7 @@ def cones_of(geometry: Geometry, aperture: Aperture | None) -> Cones | None:
 
 def spacing(cones: Cones) -> np.ndarray:
     """Return the largest step between the sums of displacements, shape (N,). [rad]"""
-    rings, around, _ = np.array(_RULES)[cones.level].T
+    rings, around, _ = np.array(RULES)[cones.level].T
     reach = cones.source + cones.detector
     return np.maximum(reach / rings, 2.0 * np.pi * reach / around)
 
@@ -172,7 +156,7 @@ def rays_through(geometry: Geometry, cones: Cones | None) -> Rays:
     keys = np.stack([cones.source, cones.detector, cones.level], axis=1)
     for key in np.unique(keys, axis=0):
         members = np.flatnonzero((keys == key).all(axis=1))
-        at_source, at_detector, share = _pairs(float(key[0]), float(key[1]), int(key[2]))
+        at_source, at_detector, share = pairs(float(key[0]), float(key[1]), int(key[2]))
         parents.append(np.repeat(members, len(share)))
         shifts_i.append(np.tile(at_source, (len(members), 1)))
         shifts_s.append(np.tile(at_detector, (len(members), 1)))
@@ -195,6 +179,10 @@ def rays_through(geometry: Geometry, cones: Cones | None) -> Rays:
             dphi=detector[1] - source[1],
             phi_i=source[1],
             wavelength=geometry.wavelength[parent],
+            axis_theta_i=geometry.theta_i[parent],
+            axis_phi_i=geometry.phi_i[parent],
+            axis_theta_s=geometry.theta_s[parent],
+            axis_dphi=geometry.dphi[parent],
         ),
         parent=parent,
         weight=weight / np.bincount(parent, weight)[parent],
@@ -202,85 +190,6 @@ def rays_through(geometry: Geometry, cones: Cones | None) -> Rays:
         # Back from the meridian frame: the transpose of the rotation into it
         turn_out=detector[3].transpose(0, 2, 1),
     )
-
-
-@lru_cache(maxsize=256)
-def _pairs(
-    source: float, detector: float, level: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return displacements (K, 2) at source and detector, and their shares (K,).
-
-    Rings of the sum w, and for each w a rule over the lens of displacements a of the source
-    for which w - a lies in the detector's disc.
-    """
-    r_i, r_s = 2.0 * np.sin(0.5 * source), 2.0 * np.sin(0.5 * detector)
-    if r_i + r_s == 0.0:
-        return np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1)
-    rings, around, rest = _RULES[level]
-    edges = np.unique([0.0, abs(r_i - r_s), r_i + r_s])
-    at_source, at_detector, shares = [], [], []
-    for low, high in pairwise(edges.tolist()):
-        count = max(2, int(np.ceil(rings * (high - low) / edges[-1])))
-        node, weight = np.polynomial.legendre.leggauss(count)
-        radii = 0.5 * (low + high) + 0.5 * (high - low) * node
-        for number, (radius, part) in enumerate(zip(radii, weight, strict=True)):
-            points, area = _lens(radius, r_i, r_s, rest)
-            turns = max(_LEAST_AROUND, int(np.ceil(around * radius / edges[-1])))
-            # Rings are staggered, so that no direction has all the points
-            angle = (np.arange(turns) + 0.5 * (number % 2)) * (2.0 * np.pi / turns)
-            along = np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, None, :]
-            aside = np.stack([-np.sin(angle), np.cos(angle)], axis=1)[:, None, :]
-            a = points[:, 0, None] * along + points[:, 1, None] * aside
-            at_source.append(a.reshape(-1, 2))
-            at_detector.append((radius * along - a).reshape(-1, 2))
-            ring = part * (high - low) * radius / turns
-            shares.append(np.tile(ring * area, turns))
-    share = np.concatenate(shares)
-    return np.concatenate(at_source), np.concatenate(at_detector), share / share.sum()
-
-
-def _lens(w: float, r_i: float, r_s: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (along w, aside) where two discs overlap, and the area each stands for.
-
-    One disc of radius r_i about 0, one of r_s about w.
-    """
-    if r_i == 0.0:
-        return np.zeros((1, 2)), np.ones(1)
-    if r_s == 0.0:
-        return np.array([[w, 0.0]]), np.ones(1)
-    if w**2 + r_i**2 <= r_s**2:
-        height = r_i
-    elif w**2 + r_s**2 <= r_i**2:
-        height = r_s
-    else:
-        foot = (w**2 + r_i**2 - r_s**2) / (2.0 * w)
-        height = np.sqrt(max(r_i**2 - foot**2, 0.0))
-    node, weight = np.polynomial.legendre.leggauss(count)
-    aside = height * np.sin(0.5 * np.pi * node)
-    slab = weight * np.cos(0.5 * np.pi * node)
-    half_i, half_s = (np.sqrt(np.maximum(r**2 - aside**2, 0.0)) for r in (r_i, r_s))
-    low, high = np.maximum(-half_i, w - half_s), np.minimum(half_i, w + half_s)
-    middle, half = 0.5 * (low + high), 0.5 * np.maximum(high - low, 0.0)
-    along = middle[:, None] + half[:, None] * node
-    area = (slab * half)[:, None] * weight
-    points = np.stack([along, np.broadcast_to(aside[:, None], along.shape)], axis=-1)
-    area = area * (_overlap(w, r_i, r_s) / max(float(area.sum()), 1e-300))
-    return points.reshape(-1, 2), area.ravel()
-
-
-def _overlap(w: float, r_i: float, r_s: float) -> float:
-    """Return the area that two discs at a distance w share."""
-    if w <= abs(r_i - r_s):
-        return float(np.pi * min(r_i, r_s) ** 2)
-    if w >= r_i + r_s:
-        return 0.0
-    to_i, to_s = (
-        np.arccos(np.clip((w**2 + r**2 - other**2) / (2.0 * w * r), -1.0, 1.0))
-        for r, other in ((r_i, r_s), (r_s, r_i))
-    )
-    corners = (r_i + r_s) ** 2 - w**2, w**2 - (r_i - r_s) ** 2
-    kite = 0.5 * np.sqrt(max(corners[0] * corners[1], 0.0))
-    return float(r_i**2 * to_i + r_s**2 * to_s - kite)
 
 
 def _across(axis_i: np.ndarray, axis_s: np.ndarray, phi_i: np.ndarray) -> np.ndarray:

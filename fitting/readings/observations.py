@@ -6,11 +6,12 @@ the degree of linear polarisation. A ratio knows nothing of absolute brightness.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fitting.readings.geometry import Geometry, geometry_of, joined
 from pbrdf.errors import real_array
 
 if TYPE_CHECKING:
@@ -45,46 +46,6 @@ NORMALISED = {f"m{element[1:]}": element for element in ELEMENTS[1:]}
 RATIOS = (*NORMALISED, "DOLP")
 
 Mask = Callable[["xr.Dataset"], "np.ndarray | xr.Dataset"]
-
-
-@dataclass(frozen=True, eq=False)
-class Geometry:
-    """Directions of N measurements.
-
-    Parameters
-    ----------
-    theta_i, theta_s, dphi, phi_i : ndarray, shape (N,)
-        Angles of the conventions page. [rad]
-    wavelength : ndarray, shape (N,)
-        NaN where unknown. [um]
-    source_half_angle, detector_half_angle : ndarray, shape (N,), optional
-        Half-angles of the cones of light, NaN where the scan names none. [rad]
-    """
-
-    theta_i: np.ndarray
-    theta_s: np.ndarray
-    dphi: np.ndarray
-    phi_i: np.ndarray
-    wavelength: np.ndarray
-    source_half_angle: np.ndarray | None = None
-    detector_half_angle: np.ndarray | None = None
-
-    @property
-    def size(self) -> int:
-        """Number of geometries."""
-        return len(self.theta_i)
-
-    def at(self, index: np.ndarray) -> "Geometry":
-        """Return the directions of these numbers."""
-        columns = {column.name: getattr(self, column.name) for column in fields(self)}
-        given = {name: one for name, one in columns.items() if one is not None}
-        return Geometry(**{name: one[index] for name, one in given.items()})
-
-    @property
-    def theta_view(self) -> np.ndarray:
-        """Signed view angle, positive on the forward side; nan out of plane. [rad]"""
-        out = np.abs(np.sin(self.dphi)) * np.sin(self.theta_s) > 1e-9
-        return np.where(out, np.nan, -np.sign(np.cos(self.dphi)) * self.theta_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,12 +148,7 @@ def observe(
     ]
     offsets = np.cumsum([0, *(part.geometry.size for part in parts)])
     together = Observations(
-        geometry=Geometry(
-            *(
-                np.concatenate([getattr(part.geometry, column.name) for part in parts])
-                for column in fields(Geometry)
-            )
-        ),
+        geometry=joined([part.geometry for part in parts]),
         scan=np.concatenate([part.scan for part in parts]),
         labels=tuple(scans),
         name=np.concatenate([part.name for part in parts]),
@@ -217,7 +173,7 @@ def _flatten(
     index: int,
 ) -> Observations:
     """Flatten one scan."""
-    geometry = _geometry(label, scan)
+    geometry = geometry_of(label, scan)
     known = [*LINEAR, *RATIOS]
     derived = _derived({str(name) for name in scan.data_vars})
     names = [name for name in known if name in scan and name not in derived]
@@ -287,37 +243,3 @@ def _stderr(scan: "xr.Dataset", name: str, good: np.ndarray) -> np.ndarray:
         )
         raise ValueError(msg)
     return stderr
-
-
-def _geometry(label: str, scan: "xr.Dataset") -> Geometry:
-    """Return the directions of a scan."""
-    if not hasattr(scan, "data_vars"):
-        msg = (
-            f"measurement must be an xarray.Dataset with the dimension geometry, got "
-            f"{type(scan).__name__} for {label}. Use data_io.read_goniometer."
-        )
-        raise TypeError(msg)
-    missing = [name for name in ("theta_i", "theta_s", "dphi") if name not in scan.coords]
-    if "geometry" not in scan.dims or missing:
-        lacks = ", ".join(missing) or "geometry"
-        msg = (
-            f"measurement {label} must have the dimension geometry with theta_i, theta_s "
-            f"and dphi [rad], got none of {lacks}. Use data_io.read_goniometer."
-        )
-        raise ValueError(msg)
-    size = scan.sizes["geometry"]
-
-    def column(name: str, default: float) -> np.ndarray:
-        if name not in scan.coords:
-            return np.full(size, default)
-        return np.broadcast_to(real_array(name, scan[name].values), (size,)).copy()
-
-    return Geometry(
-        theta_i=column("theta_i", np.nan),
-        theta_s=column("theta_s", np.nan),
-        dphi=column("dphi", np.nan),
-        phi_i=column("phi_i", 0.0),
-        wavelength=column("wavelength", np.nan),
-        source_half_angle=column("source_half_angle", np.nan),
-        detector_half_angle=column("detector_half_angle", np.nan),
-    )

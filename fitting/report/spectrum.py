@@ -1,5 +1,6 @@
 """Fitted parameters against wavelength: one table, one figure."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,11 +10,12 @@ from pbrdf.plots import COLOURS, new_figure
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from fitting.result.fit_result import FitResult
 
-__all__ = ["spectrum_figure", "spectrum_table"]
+__all__ = ["draw_spectrum", "spectrum_figure", "spectrum_of", "spectrum_table"]
 
 
 def spectrum_table(result: "FitResult") -> "pd.DataFrame":
@@ -48,6 +50,19 @@ def spectrum_table(result: "FitResult") -> "pd.DataFrame":
     return pd.concat(parts, axis=1).sort_index()
 
 
+def spectrum_of(fits: "Mapping[float, FitResult]") -> "pd.DataFrame":
+    """Return the same table of fits of one wavelength each, by wavelength [um]."""
+    import pandas as pd
+
+    rows = {}
+    for wave, fit in sorted(fits.items()):
+        rows[wave] = row = dict[str, float]()
+        for name, one in {**fit.estimates, **fit.ratios}.items():
+            row[name] = one.value
+            row |= {f"{name}_{end}": getattr(one, end) for end in ("stderr", "low", "high")}
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("wavelength")
+
+
 def spectrum_figure(result: "FitResult") -> "Figure":
     """Draw each parameter against wavelength, with its 95 % interval.
 
@@ -56,35 +71,52 @@ def spectrum_figure(result: "FitResult") -> "Figure":
     ValueError
         If the fit holds no several wavelengths, or determines none of their parameters.
     """
-    table = spectrum_table(result)
-    names = [
-        name
+    return draw_spectrum({"": spectrum_table(result)})
+
+
+def draw_spectrum(tables: "Mapping[str, pd.DataFrame]") -> "Figure":
+    """Draw tables of `spectrum_table` or `spectrum_of` over one another, by name.
+
+    Raises
+    ------
+    ValueError
+        If they determine no parameter.
+    """
+    names = dict.fromkeys(
+        str(name)
+        for table in tables.values()
         for name in table.columns
-        if not str(name).endswith(("_stderr", "_low", "_high"))
-        and np.isfinite(table[f"{name}_stderr"]).any()
-    ]
+        if f"{name}_stderr" in table and np.isfinite(table[f"{name}_stderr"]).any()
+    )
     if not names:
         msg = "result must determine parameters at several wavelengths, got none."
         raise ValueError(msg)
     columns = min(len(names), 3)
     rows = -(-len(names) // columns)
     figure, axes = new_figure(rows, columns, (4.3 * columns, 3.0 * rows))
-    wave = table.index.get_level_values("wavelength").to_numpy(dtype=float)
-    for position, axis in enumerate(axes.flat):
-        if position >= len(names):
-            axis.set_visible(False)
-            continue
-        name = names[position]
-        value = table[name].to_numpy(dtype=float)
-        ends = [table[f"{name}_{end}"].to_numpy(dtype=float) for end in ("low", "high")]
-        known = np.isfinite(table[f"{name}_stderr"].to_numpy(dtype=float))
-        error = np.abs(np.stack([value - ends[0], ends[1] - value]))
-        error = np.where(np.isfinite(error), error, 0.0)
-        axis.errorbar(
-            wave[known], value[known], error[:, known],
-            fmt="o", markersize=4, elinewidth=0.9, capsize=2, color=COLOURS[0],
-        )  # fmt: skip
-        unit = PARAMETERS[str(name)][3] if str(name) in PARAMETERS else "1"
+    for axis in axes.flat[len(names) :]:
+        axis.set_visible(False)
+    for axis, name in zip(axes.flat, names, strict=False):
+        for colour, (title, table) in zip(COLOURS, tables.items(), strict=False):
+            if name in table:
+                _draw(axis, table, name, title, colour)
+        unit = PARAMETERS[name][3] if name in PARAMETERS else "1"
         axis.set_title(f"{name} [{unit}]", fontsize="medium")
         axis.set_xlabel("wavelength [um]")
+    if len(tables) > 1:
+        axes.flat[0].legend(fontsize="small")
     return figure
+
+
+def _draw(axis: "Axes", table: "pd.DataFrame", name: str, title: str, colour: str) -> None:
+    """Draw one parameter of one table where its error is known."""
+    wave = table.index.get_level_values("wavelength").to_numpy(dtype=float)
+    value = table[name].to_numpy(dtype=float)
+    ends = [table[f"{name}_{end}"].to_numpy(dtype=float) for end in ("low", "high")]
+    known = np.isfinite(table[f"{name}_stderr"].to_numpy(dtype=float))
+    error = np.abs(np.stack([value - ends[0], ends[1] - value]))
+    error = np.where(np.isfinite(error), error, 0.0)
+    axis.errorbar(
+        wave[known], value[known], error[:, known],
+        fmt="o", markersize=4, elinewidth=0.9, capsize=2, color=colour, label=title,
+    )  # fmt: skip

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import xarray as xr
 
 import data_io
@@ -13,6 +14,7 @@ from fitting.report import explorer, html
 from fitting.report.downloads import download_links
 from fitting.report.fit_files import calibrated
 from fitting.report.layers import Layers, fitted_layers, layers_of, with_readings
+from fitting.report.spectrum import draw_spectrum, spectrum_of
 from fitting.report.surface import edge_figure, surface_figure
 from fitting.report.viewer import hemisphere_view
 from fitting.result.misfit import RULE
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from fitting.pipeline import PipelineResult
     from fitting.result.fit_result import FitResult
 
-__all__ = ["fit_columns", "result_dataset", "write_report"]
+__all__ = ["fit_columns", "result_dataset", "write_report", "write_spectrum"]
 
 
 def write_report(
@@ -74,6 +76,20 @@ def write_report(
     ]
     page = html.page("Reflectance model", [*sections, explorer.glossary()])
     (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+def write_spectrum(results: "Mapping[float, PipelineResult]", folder: Path) -> None:
+    """Write spectrum.csv and spectrum.png: both fits against the wavelength [um]."""
+    import pandas as pd
+
+    tables = {
+        "analytical": spectrum_of({w: one.analytic for w, one in results.items()}),
+        "monte carlo": spectrum_of({w: one.monte_carlo for w, one in results.items()}),
+    }
+    together = pd.concat(tables, names=["curve"]).swaplevel().sort_index()
+    together.to_csv(folder / "spectrum.csv")
+    if np.isfinite(together.filter(like="_stderr").to_numpy(dtype=float)).any():
+        draw_spectrum(tables).savefig(folder / "spectrum.png", dpi=140)
 
 
 def _in_units(result: "PipelineResult") -> xr.Dataset:

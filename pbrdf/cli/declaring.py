@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 __all__ = [
-    "Accept", "AngleUnit", "Angles", "Forward", "Normalised", "Quantity", "QuantityOption",
-    "ScanColumns", "declarations",
+    "Accept", "AngleUnit", "Angles", "DetectorCone", "Forward", "Normalised", "Quantity",
+    "QuantityOption", "ScanColumns", "SourceCone", "declarations",
 ]  # fmt: skip
 
 
@@ -63,6 +63,20 @@ Accept = Annotated[
         help="Errors of physics to go on in spite of, as `pbrdf check` names them, or all."
     ),
 ]
+SourceCone = Annotated[
+    float | None,
+    typer.Option(
+        "--source-half-angle-deg", min=0.0, max=28.0,
+        help="Half-angle of the source, in place of the file's; 0 for a point.",
+    ),
+]  # fmt: skip
+DetectorCone = Annotated[
+    float | None,
+    typer.Option(
+        "--detector-half-angle-deg", min=0.0, max=28.0,
+        help="Half-angle of the detector, in place of the file's; 0 for a point.",
+    ),
+]  # fmt: skip
 
 
 def declarations(
@@ -72,9 +86,11 @@ def declarations(
     quantity: Quantity | None,
     normalised: bool | None,
     *,
+    source_half_angle: float | None = None,
+    detector_half_angle: float | None = None,
     option: str = "--columns",
 ) -> dict[str, Any]:
-    """Return the arguments of `data_io.read_goniometer`.
+    """Return the arguments of `data_io.read_goniometer`; half-angles come in degrees.
 
     Raises
     ------
@@ -86,13 +102,17 @@ def declarations(
         raise ValueError(msg)
     return {
         "columns": _columns(columns, option),
-        "azimuth_of_forward": None
-        if azimuth_of_forward is None
-        else math.radians(azimuth_of_forward),
+        "azimuth_of_forward": _radians(azimuth_of_forward),
         "angles": None if angles is None else angles.value,
         "quantity": None if quantity is None else quantity.value,
         "normalised": normalised,
+        "source_half_angle": _radians(source_half_angle),
+        "detector_half_angle": _radians(detector_half_angle),
     }
+
+
+def _radians(angle: float | None) -> float | None:
+    return None if angle is None else math.radians(angle)
 
 
 def _columns(text: str | None, option: str) -> dict[str, str] | Path | None:

@@ -41,6 +41,16 @@ def test_a_scan_is_answered_by_a_scan(folder: Path, capsys: pytest.CaptureFixtur
     assert main([*command, *QUICK]) == 2
 
 
+def test_scans_in_other_words_are_observed_as_declared(folder: Path) -> None:
+    (folder / "other.csv").write_text("AOI,theta_s_deg,dphi_deg,R\n30,20,10,0.5\n")
+    command = ["observe", "scene.toml", "--scan", "other.csv", "-o", "other-sim.csv"]
+    words = ["--columns", "AOI=theta_i_deg,R=M00", "--azimuth-of-forward", "0"]
+    assert main([*command, *words, *QUICK]) == 0
+    scan = read_goniometer(folder / "other-sim.csv")
+    assert_allclose(np.rad2deg(scan.dphi), [190.0])
+    assert_allclose(np.rad2deg(scan.theta_s), [20.0])
+
+
 def test_a_dataset_keeps_the_bounces_apart(folder: Path) -> None:
     angles = ["--theta-i-deg", "20,40", "--theta-view-deg=-10,20"]
     command = ["observe", "scene.toml", *angles, "-o", "result.nc", *QUICK]
@@ -61,6 +71,7 @@ def test_a_dataset_keeps_the_bounces_apart(folder: Path) -> None:
         (["--phi-i-deg", "0,90"], "must be one number or uniform"),
         (["--estimator", "guess"], "guess"),
         (["--scan", "missing.csv"], "missing.csv"),
+        (["--azimuth-of-forward", "0"], "--azimuth-of-forward says how to read a --scan"),
     ],
 )
 def test_bad_input_is_one_line(

@@ -14,10 +14,11 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
-from data_io import export_mitsuba, read_goniometer
+from data_io import ConventionWarning, export_mitsuba, read_goniometer
 from data_io.reflectance import pbsdf
 from data_io.reflectance.half_vector import HalfVectorGrid, tabulate
 from pbrdf import AccuracyWarning, Material, MicrofacetModel
+from pbrdf.errors import DataFileError
 from pbrdf.optics.exchange import convert_brdf
 
 METAL = MicrofacetModel(Material(1.37, kappa=7.62), slope_rms=0.3, diffuse_albedo=0.2)
@@ -367,3 +368,28 @@ def test_a_large_table_is_thinned_with_a_word(tmp_path, monkeypatch):
     monkeypatch.setattr(pbsdf, "_ROWS", 200)
     with pytest.warns(UserWarning, match="every 2. node of each angle is read, of 576"):
         assert read_goniometer(path).sizes["geometry"] < 200
+
+
+def test_nodes_without_numbers_are_left_out_with_a_word(tmp_path):
+    path = tmp_path / "holed.pbsdf"
+    export_mitsuba(METAL, path, shape=(7, 6, 5))
+    whole = read_goniometer(path)
+    fields, content = pbsdf.tensor_fields(path, path.read_bytes()), path.read_bytes()
+    place = content.rindex(fields["M"].tobytes())
+    table = fields["M"].copy()
+    # One element of a node well above the horizon
+    table[3, 1, 1, 0, 2, 1] = np.nan
+    path.write_bytes(content[:place] + table.tobytes() + content[place + table.nbytes :])
+    size = whole.sizes["geometry"]
+    with pytest.warns(ConventionWarning, match=f"1 of {size} rows are left out, .* nan"):
+        holed = read_goniometer(path)
+    assert holed.sizes["geometry"] == size - 1
+    rows = [
+        set(zip(one.theta_i.values, one.theta_s.values, one.dphi.values, strict=True))
+        for one in (holed, whole)
+    ]
+    assert rows[0] < rows[1]
+    table[:] = np.inf
+    path.write_bytes(content[:place] + table.tobytes() + content[place + table.nbytes :])
+    with pytest.raises(DataFileError, match=f"got none at any of {size} nodes"):
+        read_goniometer(path)

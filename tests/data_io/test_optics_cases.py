@@ -312,3 +312,79 @@ def test_m00_among_ratios_is_one(tmp_path):
     )
     with pytest.raises(DataFileError, match=r"line 3, column m00: .* got 0\.5"):
         read_goniometer(tmp_path / "s.csv")
+
+
+HEAD = "theta_i_deg,theta_view_deg"
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "message"),
+    [
+        # A hint must never turn a refused file into a wrong answer
+        ("f_s,f_p", "0.3,0.2", r"expected known columns, got 'f_s', 'f_p'\. Say what"),
+        ("M00,M_10", "0.3,0.2", r"--columns M_10=M10"),
+        ("BRDF,BRDF_err", "0.3,0.2", r"--columns BRDF_err=M00_stderr"),
+        ("BRDF,sigma", "0.3,0.2", r"--columns sigma=M00_stderr"),
+        ("BRDF,u(BRDF)", "0.3,0.2", r"--columns u\(BRDF\)=M00_stderr"),
+        (
+            "M11,M12,M44",
+            "0.3,0.1,0.2",
+            r"got 'M44'\. Elements are counted from 0 here: --columns M11=M00",
+        ),
+        ("M00", "-999", r"got -999\. If -999 marks a gap, leave the cell empty"),
+    ],
+)
+def test_names_that_others_give(tmp_path, header, row, message):
+    (tmp_path / "s.csv").write_text(f"{HEAD},{header}\n30,20,{row}\n30,25,{row}\n")
+    with pytest.raises(DataFileError, match=message) as caught:
+        read_goniometer(tmp_path / "s.csv")
+    assert "f_ss" not in str(caught.value).partition("Known")[0]
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "cure"),
+    [
+        ("M11,M12", "0.3,0.1", "M11=M00,M12=M01. Counted from 0: --columns M11=M11,M12"),
+        ("M11,M11_stderr", "3,0.1", "M11=M00,M11_stderr=M00_stderr"),
+        # An element 33 may be the last of nine or of sixteen
+        ("M11,M22,M33", "0.3,0.2,0.1", "M11=M00,M22=M11,M33=M22"),
+        ("m11,m12,DOLP", "1,0.1,0.1", "m11=m00,m12=m01"),
+    ],
+)
+def test_elements_that_may_be_counted_from_one_are_refused(tmp_path, header, row, cure):
+    (tmp_path / "s.csv").write_text(f"{HEAD},{header}\n30,20,{row}\n30,25,{row}\n")
+    for said in ({}, {"quantity": "brdf"}, {"normalised": True}):
+        with pytest.raises(DataFileError, match=r"M11 is the reflectance M00") as caught:
+            read_goniometer(tmp_path / "s.csv", **said)
+        assert cure in str(caught.value)
+
+
+def test_elements_counted_from_one_are_read_as_declared(tmp_path):
+    (tmp_path / "s.csv").write_text(f"{HEAD},M11,M12\n30,20,0.3,0.1\n30,25,0.2,0.1\n")
+    scan = read_goniometer(tmp_path / "s.csv", columns={"M11": "M00", "M12": "M01"})
+    assert_array_equal(scan.M00, [0.3, 0.2])
+    assert_array_equal(scan.M01, [0.1, 0.1])
+    with pytest.raises(
+        DataFileError, match=r"got M11=M00 by --columns, but nothing of M12"
+    ):
+        read_goniometer(tmp_path / "s.csv", columns={"M11": "M00"})
+    own = {"M11": "M11", "M12": "M12"}
+    scan = read_goniometer(tmp_path / "s.csv", columns=own, quantity="brdf")
+    write_goniometer(scan, tmp_path / "own.csv")
+    assert_array_equal(read_goniometer(tmp_path / "own.csv").M11, [0.3, 0.2])
+
+
+@pytest.mark.parametrize("header", ["M00,M11", "m10,m11", "I_s,I_p,M11", "M11/M00,M22/M00"])
+def test_elements_beside_one_of_index_zero_are_counted_from_zero(tmp_path, header):
+    row = "0.4,0.3" + ",0.1" * (header.count(",") - 1)
+    (tmp_path / "s.csv").write_text(f"{HEAD},{header}\n30,20,{row}\n30,25,{row}\n")
+    assert {"M11", "m11"} & read_goniometer(tmp_path / "s.csv").keys()
+
+
+def test_bars_and_photon_energies(tmp_path):
+    (tmp_path / "s.csv").write_text(
+        f"{HEAD},energy_eV,M00\n30,20,2.0,0.3\n30,25,2.0,0.2\n".replace(",", "|")
+    )
+    scan = read_goniometer(tmp_path / "s.csv")
+    assert_allclose(scan.wavelength, 1.239841984 / 2.0, rtol=1e-9)
+    assert_array_equal(scan.M00, [0.3, 0.2])

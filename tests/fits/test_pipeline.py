@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose
@@ -180,3 +181,31 @@ def test_an_unpolarised_scan_says_what_cannot_be_known(
     assert "Only unpolarised reflectance was measured" in said
     assert "not measured" not in said
     assert "no measurement supports them" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_each_wavelength_has_its_folder_and_a_place_in_the_spectrum(tmp_path: Path) -> None:
+    write_profile(tmp_path / "profile.csv")
+    write_scan(tmp_path / "one.csv", ("M00", "M10"))
+    scan = data_io.read_goniometer(tmp_path / "one.csv")
+    waves = [
+        scan.assign_coords(wavelength=("geometry", np.full(scan.sizes["geometry"], wave)))
+        for wave in (0.45, 0.65)
+    ]
+    waves[1]["M00"] = waves[1].M00 + 0.2 / np.pi
+    data_io.write_goniometer(xr.concat(waves, "geometry"), tmp_path / "scan.csv")
+    arguments = ["pipeline", str(tmp_path / "profile.csv"), str(tmp_path / "scan.csv"),
+                 "--n", "1.5", "-o", str(tmp_path / "out"), "--n-rays", "4000",
+                 "--realizations", "8", "--source-half-angle-deg", "0.5"]  # fmt: skip
+    assert main(arguments) == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "0.45um", "0.65um", "spectrum.csv", "spectrum.png",
+    ]  # fmt: skip
+    table = pd.read_csv(tmp_path / "out/spectrum.csv").set_index(["wavelength", "curve"])
+    for curve in ("analytical", "monte carlo"):
+        low, high = (table.loc[(wave, curve)] for wave in (0.45, 0.65))
+        step = high.diffuse_albedo - low.diffuse_albedo
+        assert abs(step - 0.2) < 3.5 * np.hypot(
+            high.diffuse_albedo_stderr, low.diffuse_albedo_stderr
+        )
+    read = data_io.read_result(tmp_path / "out/0.65um/result.nc")
+    assert np.rad2deg(read.scan_source_half_angle.values) == pytest.approx(0.5)

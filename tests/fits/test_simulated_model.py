@@ -12,6 +12,7 @@ from data_io import read_model, write_goniometer
 from fitting import SimulatedModel, fit
 from fitting.models.index_grid import IndexGrid
 from fitting.models.simulated_trace import interpolate_bins, merged
+from fitting.readings.aperture import Aperture, cones_of, rays_through
 from fitting.readings.observations import Geometry
 from pbrdf import GaussianSurface, HeightMap, Material, MicrofacetModel, Scene, simulate
 from pbrdf.cli import main
@@ -51,6 +52,20 @@ def scan(model: SimulatedModel, noise: float, seed: int = 5) -> xr.Dataset:
         data[f"{name}_stderr"] = ("geometry", sigma)
     coords = dict(zip(("theta_i", "theta_s", "dphi"), where, strict=True))
     return xr.Dataset(data, {name: ("geometry", value) for name, value in coords.items()})
+
+
+def test_a_cone_of_light_is_simulated_at_its_axis(model) -> None:
+    """The analytical lobe is averaged, the noise of the bins is not."""
+    point = Geometry(*plane(9.0), np.zeros(16), np.full(16, np.nan))
+    traced, expected = len(model._run.traces), model._brdf(point)[:, 0, 0]
+    rays = rays_through(point, cones_of(point, Aperture(source=0.01, detector=0.01)))
+    found = np.bincount(rays.parent, rays.weight * model._brdf(rays.geometry)[:, 0, 0])
+    # Far from grazing (r / 4)^2 beside the slope's square is 1e-4; next to the zenith the
+    # several bounces, read at each ray, bring the noise of small bins
+    inner = np.abs(np.rad2deg(point.theta_s) - 25.0) < 20.0
+    assert inner.sum() > 6
+    assert_allclose(found[inner], expected[inner], rtol=3e-3)
+    assert len(model._run.traces) == max(traced, 1)
 
 
 def test_bins_are_read_between_their_centres_and_through_the_pole() -> None:

@@ -132,10 +132,65 @@ def constants_csv() -> bytes:
     return ("wavelength_nm,n,k\n" + "\n".join(rows)).encode()
 
 
+def csv_of_others() -> bytes:
+    rows = [
+        f"30;{v};{0.05 + 1e-4 * v:.5f};0,1;a".replace(".", ",") for v in range(-70, 75, 10)
+    ]
+    head = (
+        "Instrument: made up\ntheta_i;theta_view;BRDF;DOLP;note\n[deg];[deg];[1/sr];[-];\n"
+    )
+    return (head + "\n".join(rows)).encode("utf-16")
+
+
+def astm_scan() -> bytes:
+    rows = [f"30,0,{t},{p},{0.1 + t / 900:.4f}" for t in range(0, 80, 10) for p in (0, 180)]
+    head = "TITLE made up\nNUM_POINTS 16\nVARS theta_i,phi_i,theta_s,phi_s,BRDF\n"
+    return (head + "\n".join(rows)).encode()
+
+
+def zemax_scan() -> bytes:
+    head = (
+        "Source Measured\nSymmetry PlaneSymmetrical\nSpectralContent Monochrome\n"
+        "ScatterType BRDF\nSampleRotation 2\n0 90\nAngleOfIncidence 2\n10 30\n"
+        "ScatterAzimuth 3\n0 90 180\nScatterRadial 4\n0 5 10 20\nMonochrome\nDataBegin\n"
+    )
+    block = "TIS 0.05\n" + 3 * "0.9 0.5 0.2 0.1\n"
+    return (head + 4 * block + "DataEnd\n").encode()
+
+
+def pbsdf_scan() -> bytes:
+    def write(model: Any, path: Path) -> None:
+        with warnings.catch_warnings():
+            # So few nodes are for reading, not for rendering
+            warnings.simplefilter("ignore", UserWarning)
+            data_io.export_mitsuba(model, path, shape=(4, 5, 6))
+
+    model = pbrdf.MicrofacetModel(pbrdf.Material(1.5), slope_rms=0.3)
+    return written(write, model, ".pbsdf")
+
+
+def constants_yml() -> bytes:
+    rows = "\n".join(f"        {0.4 + k / 50:.3f} 1.5 0.0{k}" for k in range(10))
+    return f"REFERENCES: x\nDATA:\n  - type: tabulated nk\n    data: |\n{rows}\n".encode()
+
+
+def constants_nk() -> bytes:
+    return ("; nm\n" + "\n".join(f"{w} 1.5 0.01" for w in range(400, 800, 20))).encode()
+
+
+def constants_text() -> bytes:
+    rows = "\n".join(f"{w}.0\t1.5\t0.01" for w in range(400, 800, 20))
+    return f"made up\nnm\nNK\n{rows}\n".encode()
+
+
 # name: (a good file, its suffix, reader)
 READERS: dict[str, tuple[Callable[[], bytes], str, Callable[[Path], Any]]] = {
     "goniometer": (csv_scan, ".csv", data_io.read_goniometer),
     "fred": (fred_scan, ".txt", data_io.read_goniometer),
+    "table-utf16": (csv_of_others, ".csv", data_io.read_goniometer),
+    "astm": (astm_scan, ".txt", data_io.read_goniometer),
+    "zemax": (zemax_scan, ".bsdf", data_io.read_goniometer),
+    "pbsdf": (pbsdf_scan, ".pbsdf", data_io.read_goniometer),
     "profile": (profile_text, ".csv", data_io.read_profile),
     "map-text": (map_text, ".csv", data_io.read_height_map),
     "map-npy": (map_npy, ".npy", lambda path: data_io.read_height_map(path, spacing=1.0)),
@@ -144,6 +199,9 @@ READERS: dict[str, tuple[Callable[[], bytes], str, Callable[[Path], Any]]] = {
     "model": (model_toml, ".toml", data_io.read_model),
     "result": (result_nc, ".nc", data_io.read_result),
     "constants": (constants_csv, ".csv", pbrdf.materials.read),
+    "constants-yml": (constants_yml, ".yml", pbrdf.materials.read),
+    "constants-nk": (constants_nk, ".nk", pbrdf.materials.read),
+    "constants-text": (constants_text, ".mat", pbrdf.materials.read),
 }
 
 

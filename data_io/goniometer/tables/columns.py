@@ -32,8 +32,13 @@ _COLUMNS_CURE = (
     "<name>_stderr; wavelength_um, wavelength_nm; sample_rotation_deg, "
     "source_half_angle_deg, detector_half_angle_deg."
 )
-# Names that stand for one direction in one convention: a hint within a group is safe
-_SUGGESTED = tuple(t for t in TARGETS if not t.startswith(("dphi", "phi")))
+# Where a slip of the pen is told from another quantity by the name alone: not an azimuth,
+# and not a value, of which f_s is no f_ss
+_SUGGESTED = tuple(t for t in TARGETS if t.startswith(("theta", "wavelength", "sample")))
+_ERROR_WORDS = re.compile(
+    r"^u\((.+)\)$|^(.*?)[\s_-]*(?:err|error|unc|uncertainty|sigma|std)$"
+)
+_FROM_ONE = re.compile(r"^m(?:4[1-4]|[1-3]4)$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -171,20 +176,41 @@ def _unknown(
         meaning = meaning_of(name)
         if meaning is not None:
             pairs.append(f"{name}={meaning.name}_deg")
-            continue
-        close = difflib.get_close_matches(name, _SUGGESTED, n=1, cutoff=0.8)
-        if close:
-            pairs.append(f"{name}={close[0]}")
+        else:
+            pairs += [f"{name}={target}" for target in _close_to(name)]
+    if any(map(_FROM_ONE.match, unknown)):
+        cures.append("Elements are counted from 0 here: --columns M11=M00,M12=M01,...")
     if pairs:
         hints = ", ".join(pair.partition("=")[2] for pair in pairs)
         cures.append(f"Did you mean {hints}? Then give --columns {','.join(pairs)}.")
-    else:
+    elif not cures:
         cures.append("Say what they hold by --columns NAME=theta_i_deg, or NAME=ignore.")
     if without_unit:
         cures.append("Or give --angles deg or rad for all.")
     return DataFileError(
         path, "; ".join(said), " ".join([*cures, _COLUMNS_CURE]), line=table.header
     )
+
+
+def _close_to(name: str) -> list[str]:
+    """Return the target that a name most likely means, or nothing."""
+    spelled = {_letters(target): target for target in TARGETS}
+    if _letters(name) in spelled:
+        return [spelled[_letters(name)]]
+    error = _ERROR_WORDS.match(name.lower())
+    if error:
+        value = meaning_of(error[1] or error[2] or "M00")
+        return (
+            [f"{value.name}{STDERR}"]
+            if value and f"{value.name}{STDERR}" in TARGETS
+            else []
+        )
+    return difflib.get_close_matches(name, _SUGGESTED, n=1, cutoff=0.8)
+
+
+def _letters(name: str) -> str:
+    # M10 and m10 differ by their case alone
+    return re.sub(r"[^A-Za-z0-9]", "", name)
 
 
 def _to_um(numbers: pd.Series, meaning: Meaning) -> pd.Series:

@@ -155,4 +155,5 @@ def _value(plain: str, bracket: str) -> Meaning | None:
 def _is_spectral(name: str) -> bool:
     # "E", "e" and "nu" head other things in tables of light
     plain = _split(name)[0].lower()
-    return plain.startswith(("wave", "wl", "lambda", "λ")) or unit_of(name) is not None
+    heads = ("wave", "wl", "lambda", "λ", "energy", "photon", "frequency")
+    return plain.startswith(heads) or unit_of(name) is not None

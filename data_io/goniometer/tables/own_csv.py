@@ -10,6 +10,7 @@ from data_io.goniometer.declarations import QUANTITY_NAMES, Declared
 from data_io.goniometer.scan import STDERR, Scan
 from data_io.goniometer.tables.angles import directions
 from data_io.goniometer.tables.columns import read_columns
+from data_io.goniometer.tables.counting import require_counted_from_zero
 from data_io.goniometer.tables.names import meaning_of
 from data_io.goniometer.tables.quantities import mueller_elements
 from data_io.goniometer.tables.table import read_table
@@ -30,11 +31,11 @@ def looks_like(lines: list[Line]) -> bool:
     words = [
         cell.strip().strip('"')
         for line in content[:30]
-        for mark in (",", ";", "\t", None)
+        for mark in (",", ";", "\t", "|", None)
         for cell in line.text.split(mark)
     ]
     return any(meaning_of(word) for word in words if word) or any(
-        mark in line.text for line in content[:2] for mark in ",;\t"
+        mark in line.text for line in content[:2] for mark in ",;\t|"
     )
 
 
@@ -50,6 +51,8 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
         cure = "Give any of M00..M33, m01..m33, DOLP, I_s, I_p, I0..I135, S0..S3."
         raise DataFileError(path, problem, cure, line=table.header, column="M00")
     values, quantity = mueller_elements(columns.values)
+    head = table.header
+    require_counted_from_zero(path, columns, values, declared, table.comments, head)
     _require_four(path, values, table.header)
     _drop_unity(path, values, columns.lines)
     said = _quantity(path, table.comments)

@@ -13,7 +13,7 @@ from pbrdf.errors import DataFileError
 
 __all__ = ["RawTable", "read_table"]
 
-_SEPARATORS = (";", "\t", ",")
+_SEPARATORS = (";", "\t", "|", ",")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
 # What programs write where nothing was measured
 _GAP = {"", "nan", "NaN", "NAN"}
@@ -77,7 +77,7 @@ def read_table(path: Path, lines: Sequence[Line]) -> RawTable:
     """Find the names and the rows under them.
 
     The names stand in the last line before the first row of numbers; a row of units may
-    stand between them. Separators are semicolon, tab, comma or spaces, told from the names.
+    stand between them. Semicolon, tab, bar, comma or spaces separate, as the names tell.
 
     Raises
     ------

@@ -1,6 +1,5 @@
 """`pbrdf fit`: bring the analytical model, or a simulated surface, to scans."""
 
-import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -64,24 +63,8 @@ def command(
     normalised: declaring.Normalised = None,
     accept: declaring.Accept = "",
     blocked: options.Blocked = 0.0,
-    source_half_angle: Annotated[
-        float | None,
-        typer.Option(
-            "--source-half-angle-deg",
-            min=0.0,
-            max=28.0,
-            help="Half-angle of the source, in place of the file's; 0 for a point.",
-        ),
-    ] = None,
-    detector_half_angle: Annotated[
-        float | None,
-        typer.Option(
-            "--detector-half-angle-deg",
-            min=0.0,
-            max=28.0,
-            help="Half-angle of the detector, in place of the file's; 0 for a point.",
-        ),
-    ] = None,
+    source_half_angle: declaring.SourceCone = None,
+    detector_half_angle: declaring.DetectorCone = None,
     solver: Annotated[str, typer.Option(help="casadi or nlopt.")] = "casadi",
     loss: Annotated[
         str, typer.Option(help="linear, or soft_l1, huber, cauchy against outliers.")
@@ -107,14 +90,10 @@ def command(
     from pbrdf.cli.reading import read_material
     from pbrdf.cli.staging import staged_folder
 
-    cones = {
-        "source_half_angle": source_half_angle,
-        "detector_half_angle": detector_half_angle,
-    }
     declared = declaring.declarations(
-        columns, azimuth_of_forward, angles, quantity, normalised
-    )
-    declared |= {name: math.radians(v) for name, v in cones.items() if v is not None}
+        columns, azimuth_of_forward, angles, quantity, normalised,
+        source_half_angle=source_half_angle, detector_half_angle=detector_half_angle,
+    )  # fmt: skip
     measured = _read_scans(scans, wavelength, declared)
 
     from fitting.readings.masks import blocked_detector, zeros

@@ -12,6 +12,8 @@ from pbrdf.cli import declaring, options
 from pbrdf.cli.options import Kind
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from fitting.pipeline import PipelineResult
     from pbrdf import Material
 
@@ -40,6 +42,8 @@ def command(
     angles: declaring.Angles = None,
     quantity: declaring.QuantityOption = None,
     normalised: declaring.Normalised = None,
+    source_half_angle: declaring.SourceCone = None,
+    detector_half_angle: declaring.DetectorCone = None,
     accept: declaring.Accept = "",
     free: options.Free = "specular_gain,diffuse_albedo",
     shadowing: options.Shadowing = "smith-correlated",
@@ -56,7 +60,9 @@ def command(
     """Turn a measured surface and its goniometer scan into a polarised reflectance model.
 
     Writes a folder with report.html, model.toml (load it with data_io.read_model),
-    result.nc and the figures. With --quick nothing is simulated, and there is no result.nc.
+    result.nc and the figures. Of several wavelengths each has such a folder in it, beside
+    spectrum.csv and spectrum.png. With --quick nothing is simulated, and there is neither
+    result.nc nor spectrum.
 
     Example: pbrdf pipeline edge.png scan.csv --um-per-pixel 0.5 --n 1.53
     """
@@ -70,6 +76,7 @@ def command(
     material = _needed(read_material(n, kappa, material_file))
     declared = declaring.declarations(
         scan_columns, azimuth_of_forward, angles, quantity, normalised,
+        source_half_angle=source_half_angle, detector_half_angle=detector_half_angle,
         option="--scan-columns",
     )  # fmt: skip
     with ExitStack() as stack:
@@ -103,44 +110,79 @@ def command(
             typed=words_typed(),
         )
         if quick:
-            _first_look(heights, measurement, common, stage, record, surface)
-            typer.echo(f"Report:  {target / 'report.html'}")
-            return
-        index = material_file or f"{n:g} + {kappa:g} i"
-        inputs = {
-            "surface": surface.name, "scan": scan.name, "index": index, "fitted": free
-        }  # fmt: skip
-        tracing = {
-            "n_rays": n_rays, "realizations": realizations, "seed": seed, "workers": workers
-        }  # fmt: skip
-        told = _whole_way(
-            heights, measurement, common | tracing, stage, record, surface, inputs, reading
+            told = _first_looks(heights, measurement, common, stage, record, surface)
+        else:
+            index = material_file or f"{n:g} + {kappa:g} i"
+            inputs = {
+                "surface": surface.name, "scan": scan.name, "index": index, "fitted": free
+            }  # fmt: skip
+            tracing = {"n_rays": n_rays, "realizations": realizations, "seed": seed,
+                       "workers": workers}  # fmt: skip
+            told = _whole_way(
+                heights, measurement, common | tracing, stage, record, surface, inputs,
+                reading,
+            )  # fmt: skip
+    _say(told, target, quick=quick)
+    typer.echo(f"Seconds in all: {perf_counter() - begin:.1f}")
+
+
+def _say(told: dict[str, str], target: Path, *, quick: bool) -> None:
+    """Print what each wavelength gave and where its report is."""
+    for folder, text in told.items():
+        typer.echo(f"{text}\nReport:  {target / folder / 'report.html'}")
+    if len(told) > 1:
+        typer.echo(
+            "\nEach wavelength was fitted for itself; pbrdf fit shares slopes between them."
+            + ("" if quick else f"\nSpectrum: {target / 'spectrum.csv'}")
         )
-    typer.echo("\n".join(told))
-    typer.echo(f"Report:  {target / 'report.html'}")
+
+
+def _parts(
+    measurement: "xr.Dataset", stage: Path
+) -> "Iterator[tuple[float | None, str, xr.Dataset]]":
+    """Yield each wavelength [um], its folder's name, and its readings; make the folder."""
+    from fitting.readings.wavelengths import by_wavelength
+
+    for wave, part in by_wavelength(measurement).items():
+        name = "" if wave is None else f"{wave:.9g}um"
+        (stage / name).mkdir(exist_ok=True)
+        yield wave, name, part
+
+
+def _at(wave: float | None) -> list[str]:
+    return [] if wave is None else [f"\nAt {wave:.9g} um"]
 
 
 def _whole_way(
     heights: Any,
-    measurement: Any,
+    measurement: "xr.Dataset",
     chosen: dict[str, Any],
     stage: Path,
     record: dict[str, Any],
     picture: Path,
     inputs: dict[str, str],
     reading: float,
-) -> list[str]:
-    """Fit, simulate and write everything; return what to print."""
+) -> dict[str, str]:
+    """Fit, simulate and write everything; return what to print, by the folder's name."""
     from fitting.pipeline import run_pipeline
-    from fitting.report.write import write_report
+    from fitting.report.write import write_report, write_spectrum
 
-    result = run_pipeline(heights, measurement, **chosen)
-    begin, seconds = perf_counter(), {"reading": reading}
-    write_report(
-        result, stage, inputs=inputs, seconds=seconds, record=record, picture=picture
-    )
-    stages = {**seconds, **result.seconds, "report": perf_counter() - begin}
-    return [*summary(result), _times(stages)]
+    told, results = {}, {}
+    for wave, name, part in _parts(measurement, stage):
+        result = run_pipeline(heights, part, **chosen)
+        begin, seconds = perf_counter(), {"reading": reading}
+        named = inputs | ({} if wave is None else {"wavelength": f"{wave:.9g} um"})
+        write_report(
+            result, stage / name, inputs=named, seconds=seconds, record=record,
+            picture=picture,
+        )  # fmt: skip
+        stages = {**seconds, **result.seconds, "report": perf_counter() - begin}
+        told[name] = "\n".join([*_at(wave), *summary(result), _times(stages)])
+        if wave is not None:
+            results[wave] = result
+    if results:
+        write_spectrum(results, stage)
+    return told
 
 
 def _needed(material: "Material | None") -> "Material":
@@ -152,28 +194,30 @@ def _needed(material: "Material | None") -> "Material":
 
 
 def _times(stages: dict[str, float]) -> str:
-    """Return the seconds of each stage and of all, in one line."""
-    whole = stages | {"in all": sum(stages.values())}
-    return "\nSeconds: " + ", ".join(f"{name} {s:.1f}" for name, s in whole.items())
+    """Return the seconds of each stage, in one line."""
+    return "\nSeconds: " + ", ".join(f"{name} {s:.1f}" for name, s in stages.items())
 
 
-def _first_look(
+def _first_looks(
     heights: Any,
-    measurement: Any,
+    measurement: "xr.Dataset",
     common: dict[str, Any],
     stage: Path,
     record: dict[str, Any],
     picture: Path,
-) -> None:
-    """Fit the analytical curve, write and print it."""
+) -> dict[str, str]:
+    """Fit the analytical curve and write it; return what to print, by the folder's name."""
     from fitting.quick import run_quick
     from fitting.report.quick_page import write_quick
 
-    result = run_quick(heights, measurement, **common)
-    write_quick(result, stage, record=record, picture=picture)
-    typer.echo(str(result.statistics))
-    typer.echo(result.analytic.summary())
-    typer.echo("Nothing was simulated; without --quick, light of several bounces is.")
+    told = {}
+    for wave, name, part in _parts(measurement, stage):
+        result = run_quick(heights, part, **common)
+        write_quick(result, stage / name, record=record, picture=picture)
+        said = [*_at(wave), str(result.statistics), result.analytic.summary()]
+        said.append("Nothing was simulated; without --quick, light of several bounces is.")
+        told[name] = "\n".join(said)
+    return told
 
 
 def summary(result: "PipelineResult") -> Iterator[str]:

@@ -2,15 +2,15 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pbrdf.cli import options
+from pbrdf.cli import declaring, options
 from pbrdf.cli.options import Stokes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     import numpy as np
     import xarray as xr
@@ -38,6 +38,11 @@ def command(
         Path | None,
         typer.Option(help="Goniometer file whose geometries are to be simulated."),
     ] = None,
+    columns: declaring.ScanColumns = None,
+    azimuth_of_forward: declaring.Forward = None,
+    angles: declaring.Angles = None,
+    quantity: declaring.QuantityOption = None,
+    normalised: declaring.Normalised = None,
     theta_i: options.Incidences = "30",
     theta_view: Annotated[
         str,
@@ -114,17 +119,15 @@ def command(
             "Name an output that ends in .nc."
         )
         raise ValueError(msg)
+    declared = declaring.declarations(
+        columns, azimuth_of_forward, angles, quantity, normalised
+    )
     if scan is None:
+        _only_with_scan(declared)
         geometry = _plane(theta_i, theta_view)
     else:
-        geometry = _of_scan(scan, None if waves is None else waves[0])
-    azimuth = options.azimuths(phi_i)
-    if isinstance(azimuth, list):
-        msg = (
-            f"--phi-i-deg must be one number or uniform here, got {len(azimuth)}. "
-            "Run observe once for each."
-        )
-        raise ValueError(msg)
+        geometry = _of_scan(scan, None if waves is None else waves[0], declared)
+    azimuth = _one_azimuth(phi_i)
     with staged_file(target_file, force=force) as stage:
         with progress_bar("observing") as progress:
             result = pbrdf.observe(
@@ -166,15 +169,36 @@ def _plane(theta_i: str, theta_view: str) -> "tuple[np.ndarray, np.ndarray, np.n
     return source, np.abs(view), np.where(view >= 0.0, np.pi, 0.0)
 
 
+def _one_azimuth(text: str) -> str | float:
+    """Return "uniform" or the one azimuth. [rad]"""
+    azimuth = options.azimuths(text)
+    if isinstance(azimuth, list):
+        msg = (
+            f"--phi-i-deg must be one number or uniform here, got {len(azimuth)}. "
+            "Run observe once for each."
+        )
+        raise ValueError(msg)
+    return azimuth
+
+
+def _only_with_scan(declared: "Mapping[str, object]") -> None:
+    """Refuse what says how a scan is to be read where there is none."""
+    for name, value in declared.items():
+        if value is not None:
+            option = f"--{name.replace('_', '-')}"
+            msg = f"{option} says how to read a --scan, got none. Leave it out."
+            raise ValueError(msg)
+
+
 def _of_scan(
-    path: Path, wavelength: float | None
+    path: Path, wavelength: float | None, declared: "Mapping[str, Any]"
 ) -> "tuple[np.ndarray, np.ndarray, np.ndarray]":
     """Return the geometries of a measured scan, each once. [rad]"""
     import numpy as np
 
     from pbrdf.cli.reading import read_scan
 
-    scan = read_scan(path, wavelength=wavelength)
+    scan = read_scan(path, wavelength=wavelength, declared=declared)
     rows = np.stack([scan[name].values for name in ("theta_i", "theta_s", "dphi")], axis=1)
     _, first = np.unique(rows.round(9), axis=0, return_index=True)
     columns = rows[np.sort(first)].T
