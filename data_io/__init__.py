@@ -27,7 +27,14 @@ from data_io.topography.channels import ChannelWarning
 from data_io.topography.height_map import read_height_map
 from data_io.topography.mesh_map import OverhangWarning
 from data_io.topography.plausible import ScaleWarning
-from data_io.topography.profile import Profile, holds_profile, read_profile, write_profile
+from data_io.topography.profile import (
+    MendedProfile,
+    Profile,
+    holds_profile,
+    mend_profile,
+    read_profile,
+    write_profile,
+)
 
 __all__ = [
     "Bands",
@@ -38,6 +45,7 @@ __all__ = [
     "Mend",
     "MendWarning",
     "MendedMap",
+    "MendedProfile",
     "MicrographWarning",
     "MissingUnitWarning",
     "NotAMapError",
@@ -50,6 +58,7 @@ __all__ = [
     "holds_profile",
     "in_plane",
     "mend_map",
+    "mend_profile",
     "read_goniometer",
     "read_height_map",
     "read_model",

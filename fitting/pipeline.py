@@ -22,6 +22,7 @@ from fitting.readings.observations import Mask
 from fitting.readings.wavelengths import one_wavelength
 from fitting.result.fit_result import FitResult
 from fitting.run import fit
+from fitting.statistics.mended import mended_once
 from fitting.statistics.result import SurfaceStatistics
 from fitting.statistics.surface import surface_statistics
 from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene
@@ -124,7 +125,8 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
     Parameters
     ----------
     surface : Profile or HeightMap
-        The measured surface; its roughness is taken as isotropic.
+        The measured surface; its roughness is taken as isotropic. Faults of one that comes
+        as it was measured are mended first, with a warning (`data_io.mend_map`).
     measurement : Dataset
         Goniometer scan in the project's conventions, dimension `geometry`, one wavelength.
     material : Material
@@ -158,7 +160,7 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
     clock = Clock(progress or (lambda *_: None))
 
     with clock.stage("surface statistics"):
-        statistics = surface_statistics(surface, form=form)
+        statistics = surface_statistics(mended_once(surface), form=form)
     free, priors = slope_knowledge(statistics, free)
 
     bring = partial(fit, mask=mask, accept=accept)

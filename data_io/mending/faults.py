@@ -137,7 +137,7 @@ def mend(
     >>> round(found.missing * z.size)
     1
     """
-    wanted = _wanted(kinds)
+    wanted = wanted_kinds(kinds)
     heights = surface.heights.copy()
     # What is left as it is must not pass for another fault
     clean = heights
@@ -180,11 +180,12 @@ def mend(
     if not mends:
         return surface
     for one in mends:
-        warnings.warn(_sentence(name, one), MendWarning, stacklevel=2)
+        warn_of(name, one, stacklevel=3)
     return MendedMap(mended, mends=tuple(mends), raw=surface, uncertainty=uncertainty)
 
 
-def _wanted(kinds: str | Iterable[str]) -> set[str]:
+def wanted_kinds(kinds: str | Iterable[str]) -> set[str]:
+    """Return which kinds are asked for; an unknown one is refused."""
     words = kinds.split(",") if isinstance(kinds, str) else list(kinds)
     chosen = {word.strip().lower() for word in words if word.strip()}
     if chosen == {"all"}:
@@ -199,6 +200,11 @@ def _wanted(kinds: str | Iterable[str]) -> set[str]:
         )
         raise ValueError(msg)
     return chosen
+
+
+def warn_of(name: str, one: Mend, *, stacklevel: int) -> None:
+    """Warn of one kind of fault, of what was done, and of how to have it otherwise."""
+    warnings.warn(_sentence(name, one), MendWarning, stacklevel=stacklevel)
 
 
 def _sentence(name: str, one: Mend) -> str:

@@ -45,7 +45,7 @@ def find_sentinels(heights: Array) -> tuple[Array, list[float]]:
     found: list[float] = []
     while len(found) < 4:
         value = _far_value(heights[~missing])
-        if value is None and heights.ndim == 2:
+        if value is None:
             value = _patch_value(heights, missing)
         if value is None:
             break
@@ -72,7 +72,7 @@ def _far_value(known: Array) -> float | None:
 
 
 def _patch_value(heights: Array, missing: Array) -> float | None:
-    """Return the value of a flat patch with a rim of jumps, on a map that is not flat."""
+    """Return the value of a flat patch with a rim of jumps, where the rest is not flat."""
     known = heights[~missing]
     values, counts = np.unique(known, return_counts=True)
     if values.size < max(known.size / 4, _FEWEST_VALUES):
@@ -83,10 +83,11 @@ def _patch_value(heights: Array, missing: Array) -> float | None:
     if n == 0 or np.bincount(labels.ravel())[1:].max() < _SMALLEST_PATCH:
         return None
     inside, rim = [], []
-    for axis in (0, 1):
+    for axis in range(heights.ndim):
         jumps = np.abs(np.diff(heights, axis=axis))
-        ends = np.diff(patch.astype(int), axis=axis) != 0
-        both = ~patch[1:] & ~patch[:-1] if axis == 0 else ~patch[:, 1:] & ~patch[:, :-1]
+        here = np.moveaxis(patch, axis, 0)
+        ends = np.moveaxis(here[1:] != here[:-1], 0, axis)
+        both = np.moveaxis(~here[1:] & ~here[:-1], 0, axis)
         inside.append(jumps[both & np.isfinite(jumps)])
         rim.append(jumps[ends & np.isfinite(jumps)])
     others, edges = np.concatenate(inside), np.concatenate(rim)
@@ -138,4 +139,38 @@ def find_spikes(heights: Array) -> Array:
             break
         found |= new
         filled = np.where(new, around, filled)
+    return found if found.mean() <= _MOST_SPIKES else np.zeros_like(found)
+
+
+def find_spikes_along(x: Array, values: Array) -> Array:
+    """Find single points of a profile that jumped from both neighbours, to one side.
+
+    Parameters
+    ----------
+    x, values : ndarray, shape (n,)
+        Rising positions and heights, or slopes, none missing.
+
+    Returns
+    -------
+    ndarray of bool
+
+    Examples
+    --------
+    >>> z = np.sin(np.arange(40.0))
+    >>> z[17] += 30
+    >>> np.flatnonzero(find_spikes_along(np.arange(40.0), z))
+    array([17])
+    """
+    found = np.zeros(values.shape, dtype=bool)
+    if values.size < 12:
+        return found
+    share = (x[1:-1] - x[:-2]) / (x[2:] - x[:-2])
+    away = values[1:-1] - (1 - share) * values[:-2] - share * values[2:]
+    usual = _TO_RMS * float(np.median(np.abs(away)))
+    before, after = values[1:-1] - values[:-2], values[1:-1] - values[2:]
+    least = np.minimum(np.abs(before), np.abs(after))
+    # An edge jumps from one neighbour only
+    alone = (before * after > 0) & (least > 0.6 * np.abs(away))
+    if usual > 0:
+        found[1:-1] = alone & (np.abs(away) > _SPIKE * usual)
     return found if found.mean() <= _MOST_SPIKES else np.zeros_like(found)

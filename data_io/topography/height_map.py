@@ -1,6 +1,6 @@
 """Height maps: NumPy arrays, text matrices, x, y, z lists, x3p, and instrument formats."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from data_io.topography.measurement_standard import (
     read_measurement_standard,
 )
 from data_io.topography.mesh_map import MESHES, read_mesh_map
-from data_io.topography.plausible import check_scale
+from data_io.topography.plausible import check_scale, with_spacing
 from data_io.topography.sdf import is_text_sdf, read_text_sdf
 from data_io.topography.x3p import is_x3p, read_x3p_map
 from pbrdf.errors import DataFileError
@@ -52,7 +52,7 @@ def read_height_map(
         instrument's own format (SUR, OPD, PLUX, AL3D, VK, Gwyddion, AFM and others, with
         the extra ``pbrdf[formats]``).
     spacing : float or (float, float), optional
-        Grid steps dx, dy, only for a file that names none. [um]
+        Grid steps dx, dy, only for a file that names none, or none that can be. [um]
     unit : str, optional
         Length unit, only for a file that names none: of the heights of a matrix, of all
         three columns of a list. Default um.
@@ -90,7 +90,8 @@ def read_height_map(
     OverhangWarning
         If a mesh hangs over itself.
     ScaleWarning
-        If field or slopes can hardly be those of a surface.
+        If field, pixel or slopes can hardly be those of a surface but the caller gave them;
+        a file that says so by itself is refused, unless `spacing` corrects it.
 
     Examples
     --------
@@ -108,7 +109,9 @@ def read_height_map(
         path, spacing, unit, channel=channel, columns=columns, block=block,
         um_per_level=um_per_level,
     )  # fmt: skip
-    check_scale(path, found, stated=True)
+    # What the caller says of its scale is the caller's to judge
+    stated = not (spacing is None and unit is None and um_per_level is None)
+    check_scale(path, found, stated=stated)
     return mend_map(found, kinds=mend, name=path.name)
 
 
@@ -130,11 +133,9 @@ def _read_any(
     if content_start.startswith(_NPY_MAGIC):
         return _read_npy(path, spacing, unit)
     if suffix == ".x3p" or is_x3p(path):
-        _refuse_arguments(path, spacing, unit)
-        return read_x3p_map(path)
+        return _self_describing(path, read_x3p_map, spacing, unit)
     if is_text_sdf(path):
-        _refuse_arguments(path, spacing, unit)
-        return read_text_sdf(path)
+        return _self_describing(path, read_text_sdf, spacing, unit)
     if is_measurement_standard(path):
         raise NotAMapError(path, read_measurement_standard(path)[0].size)
     if suffix in MESHES:
@@ -168,11 +169,18 @@ def _read_mesh(path: Path, spacing: Spacing | None, unit: str | None) -> HeightM
     return read_mesh_map(path, unit_factor(unit or "um"), steps)
 
 
-def _refuse_arguments(path: Path, spacing: Spacing | None, unit: str | None) -> None:
-    """Refuse to override what a self-describing file says."""
-    if spacing is not None or unit is not None:
-        problem = "expected no spacing and no unit argument, the format names its own"
-        raise DataFileError(path, problem, "Leave the arguments out.")
+def _self_describing(
+    path: Path,
+    reader: Callable[[Path], HeightMap],
+    spacing: Spacing | None,
+    unit: str | None,
+) -> HeightMap:
+    """Read a file that names its scale, which the caller may correct and not contradict."""
+    if unit is not None:
+        problem = "expected no unit argument, the format names its own"
+        raise DataFileError(path, problem, "Leave the argument out.")
+    found = reader(path)
+    return found if spacing is None else with_spacing(path, found, spacing)
 
 
 def _read_npy(path: Path, spacing: Spacing | None, unit: str | None) -> HeightMap:

@@ -15,6 +15,7 @@ from data_io.topography.columns import (
     table_width,
 )
 from data_io.topography.header_fields import matrix_header
+from data_io.topography.plausible import with_spacing
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
 
@@ -97,14 +98,13 @@ def read_text_map(
     if rows.shape[1] == 3 and steps is None and spacing is None:
         plain = [Column(i, "", "xyz"[i], None) for i in range(3)]
         return _read_list(path, header, data, plain, spacing, unit)
-    if steps is not None and spacing is not None and not np.allclose(steps, spacing):
-        problem = f"expected the spacing given, {spacing} um, the header says {steps} um"
-        raise DataFileError(path, problem, "Leave the argument out or mend the header.")
     if factor is not None and unit is not None and factor != unit_factor(unit):
         problem = f"expected the unit that was given, {unit}, the header says another"
         raise DataFileError(path, problem, "Leave the argument out or mend the header.")
     factor = unit_factor(unit or "um") if factor is None else factor
-    return build_map(path, rows * factor, steps or known_steps(path, spacing))
+    if steps is None or spacing is None or np.allclose(steps, spacing):
+        return build_map(path, rows * factor, steps or known_steps(path, spacing))
+    return with_spacing(path, build_map(path, rows * factor, steps), spacing)
 
 
 def _axes(columns: list[Column] | None) -> list[Column] | None:
@@ -149,9 +149,6 @@ def _read_list(
         problem = f"expected no unit argument, the header says {', '.join(units)}"
         cure = "Leave the argument out."
         raise DataFileError(path, problem, cure, line=header[-1].number)
-    if spacing is not None:
-        problem = "expected no spacing argument, the columns x and y give the grid"
-        raise DataFileError(path, problem, "Leave the argument out.")
     factors = [unit_factor(name) for name in (units or [unit or "um"])]
     columns = columns * np.broadcast_to(factors, (3,))
     lines = data.numbers
@@ -171,7 +168,8 @@ def _read_list(
         raise DataFileError(path, problem, "Keep one of them.", line=second)
     rows = np.full(nx * ny, np.nan)
     rows[node] = columns[:, 2]
-    return build_map(path, rows.reshape(ny, nx), (dx, dy))
+    found = build_map(path, rows.reshape(ny, nx), (dx, dy))
+    return found if spacing is None else with_spacing(path, found, spacing)
 
 
 def _list_units(path: Path, header: list[Line], axes: list[Column]) -> list[str]:

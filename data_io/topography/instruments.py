@@ -15,7 +15,7 @@ import numpy as np
 from data_io.text.files import NotAMapError
 from data_io.text.units import LENGTH_UNITS, normalise_unit, unit_factor
 from data_io.topography.channels import choose_channel
-from data_io.topography.plausible import ScaleWarning, check_scale
+from data_io.topography.plausible import ScaleWarning, check_scale, with_spacing
 from data_io.topography.sur import plain_sur
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
@@ -80,7 +80,7 @@ def read_instrument_map(
         raise DataFileError(path, problem, "Export the map again.")
     found = HeightMap(heights, (size_x / nx * factor, size_y / ny * factor))
     if spacing is not None and not stated:
-        return _other_spacing(path, found, spacing)
+        return with_spacing(path, found, spacing)
     try:
         return check_scale(path, found, stated=stated)
     except DataFileError:
@@ -95,16 +95,6 @@ def read_instrument_map(
     )
     warnings.warn(msg, ScaleWarning, stacklevel=4)
     return nearer
-
-
-def _other_spacing(path: Path, found: HeightMap, spacing: Any) -> HeightMap:
-    """Return a map with the steps of the caller, if those of the file cannot be right."""
-    try:
-        check_scale(path, found, stated=False)
-    except DataFileError:
-        return HeightMap(found.heights, spacing)
-    problem = "expected no spacing argument, the file names its own"
-    raise DataFileError(path, problem, "Leave the argument out.")
 
 
 def read_instrument_profile(path: str | Path) -> tuple[np.ndarray, np.ndarray]:

@@ -15,6 +15,8 @@ class ScaleWarning(UserWarning):
 
 # The widest field of an instrument, and steps below which there is nothing to measure. [um]
 _WIDEST = 1e6
+# The longest mirror that is measured in one piece. [um]
+_LONGEST = 1e7
 _FINEST = 1e-5
 # Slopes of neighbours, in the middle of their distribution
 _STEEPEST = 30.0
@@ -46,7 +48,11 @@ def check_scale(path: str | Path, surface: HeightMap, *, stated: bool) -> Height
     ScaleWarning
         The same, for a scale that the caller gave.
     """
-    fault = _fault(surface)
+    field = max(n * d for n, d in zip(surface.shape, surface.spacing, strict=True))
+    known = surface.heights[np.isfinite(surface.heights)]
+    fault = _fault(
+        field, max(surface.spacing), typical_slope(surface), float(np.ptp(known))
+    )
     if fault is None:
         return surface
     problem, cure = fault
@@ -56,11 +62,52 @@ def check_scale(path: str | Path, surface: HeightMap, *, stated: bool) -> Height
     return surface
 
 
-def _fault(surface: HeightMap) -> tuple[str, str] | None:
+def with_spacing(
+    path: str | Path, surface: HeightMap, spacing: float | tuple[float, float]
+) -> HeightMap:
+    """Return a map with the steps of the caller, if those of its file cannot be right.
+
+    Raises
+    ------
+    DataFileError
+        If the steps of the file are plausible.
+    """
+    try:
+        check_scale(path, surface, stated=False)
+    except DataFileError:
+        return HeightMap(surface.heights, spacing)
+    dx, dy = surface.spacing
+    problem = (
+        f"expected no spacing argument, the file names its own: {dx:.6g} x {dy:.6g} um"
+    )
+    raise DataFileError(path, problem, "Leave the argument out.")
+
+
+def check_profile_scale(path: str | Path, x: np.ndarray, z: np.ndarray) -> None:
+    """Warn of a profile whose length, step or slope can hardly be what was measured.
+
+    Warns
+    -----
+    ScaleWarning
+        With the reading that would be plausible. Profiles of large mirrors are metres long.
+    """
+    length, step = float(x[-1] - x[0]), float(np.median(np.diff(x)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        slopes = np.abs(np.diff(z) / np.diff(x))
+    slopes = slopes[slopes > 0]
+    slope = float(np.median(slopes)) if slopes.size else 0.0
+    fault = _fault(length, step, slope, float(np.ptp(z)), widest=_LONGEST)
+    if fault is not None:
+        problem = fault[0].replace("field", "length").replace("pixel", "step")
+        msg = f"{Path(path).name}: {problem}. Check the units of both columns (unit=)."
+        warnings.warn(msg, ScaleWarning, stacklevel=4)
+
+
+def _fault(
+    field: float, pixel: float, slope: float, height: float, *, widest: float = _WIDEST
+) -> tuple[str, str] | None:
     """Return what is implausible and how to mend it."""
-    pixel = max(surface.spacing)
-    field = max(n * d for n, d in zip(surface.shape, surface.spacing, strict=True))
-    if field > _WIDEST or pixel < _FINEST:
+    if field > widest or pixel < _FINEST:
         other = next(
             (f for f in _FACTORS if field * f < _WIDEST / 10 and pixel * f > 1e-3), None
         )
@@ -74,14 +121,14 @@ def _fault(surface: HeightMap) -> tuple[str, str] | None:
                 f"{_length(pixel * other)}"
             )
         return problem, "Say which by spacing= in um."
-    slope = typical_slope(surface)
     if slope > _STEEPEST or 0 < slope < _FLATTEST:
-        known = surface.heights[np.isfinite(surface.heights)]
         problem = (
             f"expected slopes of a surface, got {slope:.3g} in the middle, of a height "
-            f"range of {_length(float(np.ptp(known)))} over pixels of {_length(pixel)}"
+            f"range of {_length(height)} over pixels of {_length(pixel)}"
         )
-        return problem, "Check the units of height and pixel (unit=, spacing=)."
+        return problem, (
+            "Check the units of both, and give the right pixel by spacing= in um."
+        )
     return None
 
 

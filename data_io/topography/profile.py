@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from data_io.mending.faults import Mend
+from data_io.mending.profile_faults import find_profile_faults
 from data_io.text.files import TEXT_SUFFIXES, is_text
 from data_io.text.text import Line, read_numbers, split_header
 from data_io.topography.columns import (
@@ -22,6 +24,7 @@ from data_io.topography.measurement_standard import (
     is_measurement_standard,
     read_measurement_standard,
 )
+from data_io.topography.plausible import check_profile_scale
 from data_io.topography.x3p import is_x3p, read_x3p
 from pbrdf.errors import DataFileError, real_array, require
 from pbrdf.files import complete_file
@@ -147,6 +150,70 @@ class Profile:
         return f"Profile({self.size} points, length {self.length:.6g} um, {kind} spaced)"
 
 
+class MendedProfile(Profile):
+    """A profile in which faults were found, with the profile as it was.
+
+    Parameters
+    ----------
+    x, z, slope
+        As of `Profile`, without the points that were left out.
+    mends : tuple of Mend
+        What was found; places are those of `raw`.
+    raw : Profile
+        As it was measured.
+    """
+
+    mends: tuple[Mend, ...]
+    raw: Profile
+
+    def __init__(self, profile: Profile, *, mends: tuple[Mend, ...], raw: Profile) -> None:
+        super().__init__(profile.x, profile.z, slope=profile.slope)
+        object.__setattr__(self, "mends", mends)
+        object.__setattr__(self, "raw", raw)
+
+
+def mend_profile(
+    profile: Profile, *, kinds: str | Sequence[str] = "all", name: str = "profile"
+) -> Profile:
+    """Leave out points that stand for missing ones or jumped, and say which.
+
+    Parameters
+    ----------
+    profile : Profile
+        As measured; of a profile of slopes these are looked at, and integrated again.
+    kinds : str or sequence of str
+        ``all``, ``none``, or some of sentinels and spikes, as in `data_io.mend_map`. What
+        is found but not asked for is named and left.
+    name : str
+        Of the profile, for the warning.
+
+    Returns
+    -------
+    Profile
+        The same if nothing was found, else a `MendedProfile`.
+
+    Raises
+    ------
+    ValueError
+        If a kind is unknown.
+
+    Warns
+    -----
+    MendWarning
+        For each kind that was found.
+    """
+    values = profile.z if profile.slope is None else profile.slope
+    mends = find_profile_faults(profile.x, values, kinds=kinds, name=name)
+    if not mends:
+        return profile
+    kept = ~np.logical_or.reduce([one.where & one.mended for one in mends])
+    if profile.slope is None:
+        left = Profile(profile.x[kept], profile.z[kept])
+    else:
+        left = Profile.from_slope(profile.x[kept], profile.slope[kept])
+    return MendedProfile(left, mends=mends, raw=profile)
+
+
 def read_profile(
     path: str | Path,
     *,
@@ -154,6 +221,7 @@ def read_profile(
     columns: Columns | None = None,
     spacing: float | None = None,
     block: int | None = None,
+    mend: str | Sequence[str] = "all",
 ) -> Profile:
     r"""Read a surface profile from a table of text, or an instrument's own file.
 
@@ -179,12 +247,15 @@ def read_profile(
         Distance of points, only for a single column whose header names none. [um]
     block : int, optional
         Which of several blocks of data, from 1.
+    mend : str or sequence of str
+        Which faults to mend: ``all``, ``none``, or some of sentinels and spikes; see
+        `data_io.mend_profile`. All that are found are named.
 
     Returns
     -------
     Profile
-        Positions and heights. [um] Of a file of slopes these are `Profile.slope`, and the
-        heights their integral.
+        Positions and heights [um], a `data_io.MendedProfile` if faults were found. A file
+        of slopes gives `Profile.slope`, and the heights are their integral.
 
     Raises
     ------
@@ -193,8 +264,12 @@ def read_profile(
 
     Warns
     -----
+    MendWarning
+        For every kind of fault in the heights.
     MissingUnitWarning
         If neither the file nor the caller names a unit.
+    ScaleWarning
+        If length, step or slopes can hardly be those of a surface.
 
     Examples
     --------
@@ -206,6 +281,19 @@ def read_profile(
     Profile(3 points, length 1 um, evenly spaced)
     """
     path = Path(path)
+    found = _read_any(path, unit, columns, spacing, block)
+    check_profile_scale(path, found.x, found.z)
+    return mend_profile(found, kinds=mend, name=path.name)
+
+
+def _read_any(
+    path: Path,
+    unit: str | tuple[str, str] | None,
+    columns: Columns | None,
+    spacing: float | None,
+    block: int | None,
+) -> Profile:
+    """Read a profile of any format, as it is."""
     if is_x3p(path):
         return _read_x3p_profile(path)
     if is_measurement_standard(path):

@@ -8,6 +8,7 @@ import numpy as np
 
 from fitting.prediction.facets import Facets, facets_of, find_patch, slope_table
 from fitting.prediction.prediction import Draw, Prediction
+from fitting.statistics.mended import mended_once
 from pbrdf import HeightMap, Material, MicrofacetModel
 from pbrdf.errors import one_number
 from pbrdf.optics import library
@@ -113,7 +114,7 @@ def predict(
         index_stderr = _INDEX if kappa == 0 and np.isfinite(n) else 0.0
     if base_albedo is None:
         base_albedo = _BASE if bare and np.isfinite(n) else 0.0
-    mended = _mended(surface)
+    mended = mended_once(surface)
     patch = find_patch(mended, wavelength)
     facets = facets_of(mended, wavelength, patch=patch, resolution=resolution)
     notes = [
@@ -166,15 +167,6 @@ def _ensemble(
             )
         )
     return tuple(draws)
-
-
-def _mended(surface: HeightMap) -> HeightMap:
-    """Return the map with its faults mended, if that was not done or declined before."""
-    from data_io.mending.faults import MendedMap, mend
-
-    if isinstance(surface, MendedMap) or surface.periodic:
-        return surface
-    return mend(surface)
 
 
 def _model(

@@ -135,6 +135,12 @@ def _round_length(length: float) -> float:
 
 
 def _draw_mends(axis: "Axes", surface: Any, mends: list[Any]) -> None:
+    names = ", ".join(f"{one.kind} ({one.count})" for one in mends)
+    done = "mended" if all(one.mended for one in mends) else "found"
+    title = f"{done}: {names}"
+    if not hasattr(surface, "heights"):
+        _draw_left_out(axis, surface, mends, title)
+        return
     where = np.zeros(surface.shape)
     for number, one in enumerate(mends, start=1):
         where[one.where] = number
@@ -144,9 +150,21 @@ def _draw_mends(axis: "Axes", surface: Any, mends: list[Any]) -> None:
         vmin=0, vmax=len(mends), interpolation="none",
     )  # fmt: skip
     axis.grid(False)
-    names = ", ".join(f"{one.kind} ({one.count})" for one in mends)
-    done = "mended" if all(one.mended for one in mends) else "found"
-    axis.set(xlabel="x [um]", ylabel="y [um]", title=f"{done}: {names}")
+    axis.set(xlabel="x [um]", ylabel="y [um]", title=title)
+
+
+def _draw_left_out(axis: "Axes", profile: Any, mends: list[Any], title: str) -> None:
+    """Mark the faults of a profile on what was measured."""
+    raw = profile.raw
+    values = raw.z if raw.slope is None else raw.slope
+    axis.plot(raw.x, values, color=COLOURS[0], linewidth=0.8)
+    for colour, one in zip(COLOURS[1:], mends, strict=False):
+        axis.plot(raw.x[one.where], values[one.where], "x", color=colour, label=one.kind)
+    # A sentinel of 1e38 must not hide the rest
+    low, high = np.quantile(values, [0.02, 0.98])
+    axis.set_ylim(low - 2 * (high - low), high + 2 * (high - low))
+    axis.set(xlabel="x [um]", ylabel="measured", title=title)
+    axis.legend(frameon=False, fontsize="small")
 
 
 def _draw_heights(axis: "Axes", found: "SurfaceStatistics") -> None:

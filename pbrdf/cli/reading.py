@@ -79,8 +79,9 @@ def read_surface(
         return data_io.read_profile_image(path, um_per_pixel, **given)
     if kind is Kind.profile:
         return data_io.read_profile(
-            path, unit=_units(unit), columns=columns, spacing=spacing, block=block
-        )
+            path, unit=_units(unit), columns=columns, spacing=spacing, block=block,
+            mend=mend,
+        )  # fmt: skip
     try:
         return data_io.read_height_map(
             path, spacing=spacing, unit=unit, channel=channel, columns=columns, block=block,
@@ -89,7 +90,7 @@ def read_surface(
     except data_io.NotAMapError:
         if not guessed:
             raise
-        return data_io.read_profile(path, unit=_units(unit))
+        return data_io.read_profile(path, unit=_units(unit), mend=mend)
 
 
 def _units(text: str | None) -> str | tuple[str, str] | None:

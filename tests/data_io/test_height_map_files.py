@@ -208,7 +208,12 @@ def test_x3p_checksums_are_checked(tmp_path):
             "every point is marked missing",
         ),
         ("map.csv", "1,2\n3,4\n", {"spacing": -1.0}, "spacing must be positive"),
-        ("map.csv", "# spacing_um=2\n1,2\n3,4\n", {"spacing": 1.0}, "the header says"),
+        (
+            "map.csv",
+            "# spacing_um=2\n1,2\n3,4\n",
+            {"spacing": 1.0},
+            "names its own: 2 x 2 um",
+        ),
         ("map.csv", "# spacing_um=two\n1,2\n3,4\n", {}, "line 1, column spacing: .*'two'"),
         (
             "map.csv",
@@ -231,7 +236,7 @@ def test_x3p_checksums_are_checked(tmp_path):
         ("map.npy", b"\x93NUMPY\x01\x00", {"spacing": 1.0}, "expected a .npy file"),
         ("map.npy", b"text", {"spacing": 1.0}, "does not start like one"),
         ("map.x3p", b"PK\x03\x04 truncated", {}, "expected an x3p"),
-        ("map.x3p", b"PK\x03\x04", {"spacing": 1.0}, "Leave the arguments out"),
+        ("map.x3p", b"PK\x03\x04", {"unit": "nm"}, "Leave the argument out"),
     ],
 )
 def test_a_bad_file_is_refused(tmp_path, name, content, options, message):

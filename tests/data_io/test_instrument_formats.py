@@ -252,7 +252,9 @@ def test_a_map_is_no_profile(tmp_path):
         DataFileError, match=r"expected a profile, got a map.*read_height_map"
     ):
         read_profile(path)
-    with pytest.raises(DataFileError, match=r"names its own\. Leave the argument out"):
+    with pytest.raises(
+        DataFileError, match=r"names its own: .* um\. Leave the argument out"
+    ):
         read_height_map(path, spacing=1.0)
 
 

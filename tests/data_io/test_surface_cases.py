@@ -8,11 +8,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from data_io import (
     MendedMap,
+    MendedProfile,
     MendWarning,
     MissingUnitWarning,
     OverhangWarning,
+    Profile,
     ScaleWarning,
     holds_profile,
+    mend_profile,
     read_height_map,
     read_profile,
 )
@@ -275,8 +278,89 @@ def test_measurement_standards(tmp_path):
 def test_a_field_of_metres_is_refused_with_both_readings(tmp_path):
     # A SUR or HGT file would do as well; this one is a map whose steps are metres
     path = write(tmp_path, "# spacing_um = 2.5e6\n" + "0,1,0\n1,0,2\n0,1,1\n" * 22)
-    with pytest.warns(ScaleWarning, match=r"got 165 m with a pixel of 2.5 m; .*165 um"):
+    message = r"got 165 m with a pixel of 2.5 m; .*165 um"
+    with pytest.raises(DataFileError, match=message):
         read_height_map(path)
+    # The caller may correct the file, or stand by it with a warning
+    assert read_height_map(path, spacing=2.5).spacing == (2.5, 2.5)
+    with pytest.warns(ScaleWarning, match=message):
+        assert read_height_map(path, spacing=2.5e6).spacing == (2.5e6, 2.5e6)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e6])
+def test_every_format_that_names_its_scale_is_judged_alike(tmp_path, factor):
+    """Metres of SDF, lists of x, y, z, and steps of a matrix; right ones may not change."""
+    z = np.add.outer(np.arange(5) % 2, np.arange(6) % 3) * factor
+    step = 0.5 * factor
+    texts = {
+        "a.sdf": "aISO-1.0\nNumPoints = 6\nNumProfiles = 5\n"
+        f"Xscale = {step * 1e-6}\nYscale = {step * 1e-6}\nZscale = {1e-6}\n*\n"
+        + "\n".join(" ".join(map(str, row)) for row in z) + "\n*\n",
+        "b.csv": "x_um,y_um,z_um\n" + "\n".join(
+            f"{i * step},{j * step},{z[j, i]}" for j in range(5) for i in range(6)),
+        "c.csv": f"# spacing_um = {step}\n" + "\n".join(
+            ",".join(map(str, row)) for row in z),
+    }  # fmt: skip
+    for name, text in texts.items():
+        path = write(tmp_path, text, name)
+        if factor == 1:
+            assert_allclose(read_height_map(path).spacing, (0.5, 0.5))
+            with pytest.raises(DataFileError, match=r"names its own: 0.5 x 0.5 um"):
+                read_height_map(path, spacing=0.7)
+        else:
+            with pytest.raises(
+                DataFileError, match=r"got 3 m with a pixel of 500 mm; .*um"
+            ):
+                read_height_map(path)
+            with pytest.warns(ScaleWarning, match="expected slopes"):
+                assert read_height_map(path, spacing=0.5).spacing == (0.5, 0.5)
+
+
+def test_profiles_leave_sentinels_and_spikes_out_or_name_them(tmp_path):
+    rng = np.random.default_rng(7)
+    x = 0.5 * np.arange(900)
+    z = 20 + np.cumsum(rng.normal(size=900)) / 10 + 0.01 * rng.normal(size=900)
+    true = z.copy()
+    z[100:120], z[300], z[500], z[700:703] = 0, 1e38, 60.0, -9999
+    text = "x_um,z_um\n" + "\n".join(
+        f"{a},{b!r}" for a, b in zip(x, z.tolist(), strict=True)
+    )
+    path = write(tmp_path, text)
+    with pytest.warns(MendWarning) as caught:
+        found = read_profile(path)
+    said = " ".join(str(one.message) for one in caught)
+    assert "24 of 900 points are -9999, 1e+38, 0, far from the rest" in said
+    assert "1 of 900 points jumps from both neighbours; they are taken as missing" in said
+    kept = np.isin(x, found.x)
+    assert isinstance(found, MendedProfile)
+    assert np.count_nonzero(~kept) == 25
+    assert_allclose(found.z, true[kept])
+    assert_allclose(found.raw.z, z)
+    assert [one.kind for one in found.mends] == ["sentinels", "spikes"]
+    with pytest.warns(MendWarning, match="left as they are; mend='spikes'"):
+        left = read_profile(path, mend="sentinels")
+    assert left.size == 876
+    # An edge is no spike, a flat step no sentinel, a random surface sound
+    sound = np.where(x > 200, 3.0, 0.0) + 0.01 * rng.normal(size=900)
+    for heights in (sound, np.sign(np.sin(x / 9)), true, rng.normal(size=900)):
+        assert mend_profile(Profile(x, heights)).size == 900
+
+
+def test_slopes_are_mended_before_they_are_integrated():
+    x = np.arange(400.0)
+    slope = 0.1 * np.sin(x / 9) + 1e-4 * np.random.default_rng(1).normal(size=400)
+    slope[200] = 5
+    with pytest.warns(MendWarning, match="1 of 400 points jumps"):
+        found = mend_profile(Profile.from_slope(x, slope))
+    assert found.size == 399
+    assert np.abs(found.slope).max() < 0.11
+    assert_allclose(np.ptp(found.z), 2 * 0.1 * 9, rtol=0.02)
+
+
+def test_a_profile_of_kilometres_is_named(tmp_path):
+    text = "x_m,z_um\n" + "\n".join(f"{50 * i},{i % 7}" for i in range(300))
+    with pytest.warns(ScaleWarning, match=r"length of an instrument, got 1.495e\+04 m"):
+        read_profile(write(tmp_path, text))
 
 
 def test_sentinels_are_missing_by_default_and_left_by_choice():

@@ -2,6 +2,7 @@
 
 import json
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,9 @@ import xarray as xr
 from numpy.testing import assert_allclose
 
 import data_io
+from fitting import run_pipeline
 from fitting.report.layers import fitted_layers
-from pbrdf import Material, MicrofacetModel
+from pbrdf import GaussianSurface, HeightMap, Material, MicrofacetModel
 from pbrdf.cli import main
 from tests.pictures.browser import asked, assert_sound
 
@@ -209,3 +211,37 @@ def test_each_wavelength_has_its_folder_and_a_place_in_the_spectrum(tmp_path: Pa
         )
     read = data_io.read_result(tmp_path / "out/0.65um/result.nc")
     assert np.rad2deg(read.scan_source_half_angle.values) == pytest.approx(0.5)
+
+
+def test_a_raw_map_is_mended_and_one_left_by_choice_is_not(tmp_path: Path) -> None:
+    """Also profiles; only the statistics are computed here."""
+    true = GaussianSurface(
+        shape=(160, 160), spacing=1.0, corr_length=12.0, slope_rms=0.3
+    ).sample(seed=3)
+    banded = HeightMap(np.round(true.heights / 0.6) * 0.6, 1.0)
+    z = np.sin(np.arange(200) / 5)
+    z[7] = -9999
+    path = tmp_path / "scan.csv"
+    write_scan(path, ("M00",))
+    scan = data_io.read_goniometer(path)
+
+    class Enough(Exception):
+        """What follows the statistics is not of interest."""
+
+    def stop(stage: str, done: int, total: int) -> None:
+        if stage == "analytical fit":
+            raise Enough
+
+    def run(surface: object) -> None:
+        with pytest.raises(Enough):
+            run_pipeline(surface, scan, material=Material(1.5), progress=stop)
+
+    with pytest.warns(data_io.MendWarning, match="in [0-9]+ bands of 0.6"):
+        run(banded)
+    with pytest.warns(data_io.MendWarning, match="1 of 200 points is -9999"):
+        run(data_io.Profile(np.arange(200.0), z))
+    with pytest.warns(data_io.MendWarning, match="left as they are"):
+        left = data_io.mend_map(banded, kinds="none")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run(left)
