@@ -1,67 +1,50 @@
 """Contour and baseline of a drop in a silhouette, to a fraction of a pixel."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy import ndimage
 
+from fitting.drops.baseline import HIDDEN, SEEN, Line, combine, mirror_line
 from fitting.drops.needle import Needle, erase_needle
+from fitting.drops.on_line import DropContour, drops_on_line
 from fitting.drops.scene import Scene, scale_by_light, thresholds_of
 
-# A baseline leans less than this against the rows. [rad]
-MAX_LEAN = np.deg2rad(20)
-# Pixels of finite size, and grey levels known to a hundredth of the contrast, each for drop
-# and substrate, leave a baseline no better known. [pixels], [blurs]
-OFFSET_FLOOR, LEVEL_ERROR = 0.03, 0.035
 # Tones that differ less than this between dark (0) and ground (1) count as one
 LEAST_TONE = 0.03
 # Narrower than this, against the widest drop, is dust
 LEAST_WIDTH = 0.2
 
 
-@dataclass(frozen=True, kw_only=True)
-class DropContour:
-    """The border of a drop above its baseline.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 2)
-        Along the baseline from the left contact, and above it; from left to right along the
-        contour. [pixels]
-    baseline : ndarray, shape (2, 2)
-        Row and column of the left and of the right contact point. [pixels]
-    lean : float
-        Counter-clockwise angle of the baseline with the rows. [rad]
-    lean_stderr : float
-        Its standard error. [rad]
-    offset_stderr : float
-        Standard error of the baseline's height. [pixels]
-    blur : float
-        Standard deviation of the border's blur. [pixels]
-    """
-
-    points: np.ndarray
-    baseline: np.ndarray
-    lean: float
-    lean_stderr: float
-    offset_stderr: float
-    blur: float
-
-
 def find_drops(grey: np.ndarray, baseline: np.ndarray | None) -> list[DropContour]:
-    """Return the dark drops that stand on a straight darker line, from left to right.
+    """Return the dark drops that stand on a darker line, from left to right.
 
     Each border is taken midway between its own two tones, those of the ground and of the
     drop, or of the ground and of the substrate. A needle that enters from the top is left
-    out.
+    out. A given baseline is put together with the border that is seen; where there is none,
+    the line that mirrors a drop onto its image is the baseline.
     """
-    given = None if baseline is None else np.stack([baseline[:, 1], -baseline[:, 0]], 1)
     step = max(1, min(grey.shape) // 800)
     few = ndimage.gaussian_filter(grey[::step, ::step], 1.0)
     if np.ptp(few) < 0.02:
         return []
     thresholds = thresholds_of(few)
     grey, needle = erase_needle(grey, thresholds[0])
+    drops = _drops_seen(grey, step, thresholds, None)
+    if baseline is not None:
+        given = np.stack([baseline[:, 1], -baseline[:, 0]], 1)
+        moved = [moved_to(drop, given) for drop in drops]
+        drops = [drop for drop in moved if drop is not None]
+        drops = drops or _drops_seen(grey, step, thresholds, given)
+    elif not drops:
+        drops = _drops_with_image(grey, step, thresholds[0])
+    return [_outside(drop, needle) for drop in drops]
+
+
+def _drops_seen(
+    grey: np.ndarray, step: int, thresholds: list[float], given: np.ndarray | None
+) -> list[DropContour]:
+    """Return the drops on a border of the substrate, or on a given line."""
     bare: list[DropContour] = []
     for threshold in thresholds:
         scene = scale_by_light(grey, step, threshold)
@@ -76,17 +59,60 @@ def find_drops(grey: np.ndarray, baseline: np.ndarray | None) -> list[DropContou
             continue
         if abs(tone) > LEAST_TONE:
             drops = _drops_at(scene, (1 + tone) / 2, given) or drops
-        drops = [_at_own_level(scene, drop, (1 + tone) / 2) for drop in drops]
-        return [_outside(drop, needle) for drop in drops]
+        if given is None:
+            drops = [replace(drop, hidden=_hidden_chance(scene, drop)) for drop in drops]
+        return [_at_own_level(scene, drop, (1 + tone) / 2) for drop in drops]
     # A given baseline needs no border
-    return [_outside(drop, needle) for drop in bare] if given is not None else []
+    return bare if given is not None else []
+
+
+def _drops_with_image(grey: np.ndarray, step: int, threshold: float) -> list[DropContour]:
+    """Return the drops on a substrate as bright as the ground, by their mirror images."""
+    scene = scale_by_light(grey, step, threshold)
+    if scene is None:
+        return []
+    columns = scene.part.shape[1]
+    found = []
+    for xy in sorted(scene.contours(scene.level), key=len)[-3:]:
+        row, column = -xy[:, 1] - scene.corner[0], xy[:, 0] - scene.corner[1]
+        # The frame may cut the image, and nothing else
+        if row.min() < 3 or column.min() < 3 or column.max() > columns - 4:
+            continue
+        line = mirror_line(xy)
+        if line is None:
+            continue
+        ends = np.array([[x, line.at(x)] for x in (xy[:, 0].min(), xy[:, 0].max())])
+        for drop in drops_on_line(xy, scene.normals(xy), 1.0, ends):
+            found.append(
+                replace(
+                    _at_own_level(scene, drop, scene.level),
+                    mirrored=True,
+                    offset_stderr=line.level_error,
+                    lean_stderr=line.slope_error,
+                )
+            )
+    return sorted(found, key=lambda drop: drop.baseline[:, 1].mean())
+
+
+def _hidden_chance(scene: Scene, drop: DropContour) -> float:
+    """Chance that a foot is hidden: none where a mirror image shows the contact."""
+    origin, axes = _frame(drop)
+    left, right = drop.points[0, 0], drop.points[-1, 0]
+    along = np.arange(left + 0.2 * (right - left), right - 0.2 * (right - left))
+    below = np.arange(3 * drop.blur + 2, 6 * drop.blur + 8)
+    grid = np.stack(np.meshgrid(along, -below), axis=-1).reshape(-1, 2)
+    tones = scene.at(scene.part, origin + grid @ axes)
+    if not np.isfinite(tones).any():
+        return HIDDEN
+    apart = float(np.nanmedian(tones)) - _substrate_tone(scene, drop)
+    return float(HIDDEN * np.exp(-((apart / SEEN) ** 2)))
 
 
 def _drops_at(scene: Scene, level: float, given: np.ndarray | None) -> list[DropContour]:
     """Return the drops whose border and baseline are contours at one level."""
     drops = []
     for xy in scene.contours(level):
-        drops += _drops_on_line(xy, scene.normals(xy), 1.0, given)
+        drops += drops_on_line(xy, scene.normals(xy), 1.0, given)
     # Dust on the substrate is no second drop
     widest = max((np.ptp(drop.points[:, 0]) for drop in drops), default=0.0)
     drops = [drop for drop in drops if np.ptp(drop.points[:, 0]) > LEAST_WIDTH * widest]
@@ -99,6 +125,41 @@ def _frame(drop: DropContour) -> tuple[np.ndarray, np.ndarray]:
     axes = np.array([[cos, sin], [-sin, cos]])
     row, column = drop.baseline[0]
     return np.array([column, -row]) - drop.points[0, 0] * axes[0], axes
+
+
+def moved_to(drop: DropContour, given: np.ndarray) -> DropContour | None:
+    """Put a drop on the baseline that a given line and its own make; None if far from it.
+
+    Where the given line is below the border, the front edge of the substrate hides the foot
+    and the curves go on to the line.
+    """
+    origin, axes = _frame(drop)
+    xy = origin + drop.points @ axes
+    contacts = [(float(column), -float(row)) for row, column in drop.baseline]
+    (x0, y0), (x1, y1) = contacts
+    middle, height = (x0 + x1) / 2, float(drop.points[:, 1].max())
+    named = Line.through(given, middle)
+    seen = Line(
+        middle, (y0 + y1) / 2, (y1 - y0) / (x1 - x0), drop.offset_stderr, drop.lean_stderr
+    )
+    off = seen.level - named.level
+    if not -0.6 * height < off < 0.5 * height:
+        return None
+    off = max((seen.at(x) - named.at(x) for x in (x0, x1)), key=abs)
+    line = combine(named, seen, (x0, x1))
+    lean = float(np.arctan(line.slope))
+    axes = np.array([[np.cos(lean), np.sin(lean)], [-np.sin(lean), np.cos(lean)]])
+    start = np.array([middle, line.level])
+    points = (xy - start) @ axes.T
+    points = points[points[:, 1] > 0]
+    if len(points) < 2:
+        return None
+    ends = start + np.outer([points[0, 0], points[-1, 0]], axes[0])
+    return replace(
+        drop, points=points, baseline=np.stack([-ends[:, 1], ends[:, 0]], axis=1),
+        lean=lean, lean_stderr=line.slope_error, offset_stderr=line.level_error,
+        hidden=0.0, off=off,
+    )  # fmt: skip
 
 
 def _substrate_tone(scene: Scene, drop: DropContour) -> float:
@@ -163,148 +224,3 @@ def _outside(drop: DropContour, needle: Needle | None) -> DropContour:
     upper = drop.points[:, 1] > 0.5 * drop.points[:, 1].max()
     touched = upper & (column > needle.left) & (column < needle.right)
     return replace(drop, points=drop.points[~touched])
-
-
-def _drops_on_line(
-    xy: np.ndarray, normal: np.ndarray, contrast: float, given: np.ndarray | None
-) -> list[DropContour]:
-    """Find a baseline in one contour, and the bulges over it."""
-    steepness = np.hypot(*normal.T)
-    upward = normal[:, 1] > np.cos(MAX_LEAN) * steepness
-    candidates = upward.copy()
-    for _ in range(4):
-        if given is None:
-            line = _straightest_line(xy[candidates])
-        else:
-            direction = given[1] - given[0]
-            line = (given[0], direction * np.sign(direction[0]) / np.hypot(*direction))
-        if line is None:
-            return []
-        origin, direction = line
-        along = (xy - origin) @ direction
-        above = (xy - origin) @ np.array([-direction[1], direction[0]])
-        flank = upward & (np.abs(above) < 2.5) if given is None else np.abs(above) < 2.5
-        # Nothing but the contacts need lie on a given baseline
-        least = 20 if given is None else 4
-        if np.count_nonzero(flank) < least:
-            runs = []
-        else:
-            runs = _bulges(along, above, flank, normal[:, 1] > 0)
-        found = [_measure(xy, flank, run, steepness, contrast, given) for run in runs]
-        if runs or given is not None:
-            return [drop for drop in found if drop is not None]
-        # The straightest part was not a baseline with a drop on it, so look elsewhere
-        candidates &= np.abs(above) > 4
-        if np.count_nonzero(candidates) < 40:
-            return []
-    return []
-
-
-def _straightest_line(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return a point and the direction of the line near most points (RANSAC)."""
-    if len(xy) < 40:
-        return None
-    rng = np.random.default_rng(0)
-    pairs = rng.integers(0, len(xy), (600, 2))
-    span = np.ptp(xy[:, 0])
-    best: tuple[np.ndarray, np.ndarray] | None = None
-    best_count = 0
-    sample = xy[:: max(1, len(xy) // 3000)]
-    for i, j in pairs:
-        step = xy[j] - xy[i]
-        if abs(step[0]) < 0.1 * span or abs(np.arctan2(step[1], abs(step[0]))) > MAX_LEAN:
-            continue
-        direction = step * np.sign(step[0]) / np.hypot(*step)
-        distance = np.abs((sample - xy[i]) @ np.array([-direction[1], direction[0]]))
-        count = int(np.count_nonzero(distance < 1.5))
-        if count > best_count:
-            best, best_count = (xy[i], direction), count
-    if best is None:
-        return None
-    origin, direction = best
-    for _ in range(3):
-        near = np.abs((xy - origin) @ np.array([-direction[1], direction[0]])) < 2.0
-        origin = xy[near].mean(axis=0)
-        direction = np.linalg.svd(xy[near] - origin, full_matrices=False)[2][0]
-        direction = direction * np.sign(direction[0])
-    return origin, direction
-
-
-def _bulges(
-    along: np.ndarray, above: np.ndarray, flank: np.ndarray, bright_above: np.ndarray
-) -> list[np.ndarray]:
-    """Return the indices of each high run between two flanks with brightness over it."""
-    start = int(np.argmax(flank))
-    order = np.roll(np.arange(along.size), -start)
-    closed = np.hypot(along[0] - along[-1], above[0] - above[-1]) < 1.5
-    labels, _ = ndimage.label(~flank[order])
-    runs = []
-    for box in ndimage.find_objects(labels):
-        part = order[box[0]]
-        top = int(part[np.argmax(above[part])])
-        # The run through the ends of an open contour has no second flank
-        open_ended = box[0].stop == order.size and not closed
-        large = above[top] >= 5 and np.ptp(along[part]) >= 15
-        if large and bright_above[top] and not open_ended and np.median(above[part]) > 0:
-            runs.append(part)
-    return runs
-
-
-def _measure(
-    xy: np.ndarray,
-    flank: np.ndarray,
-    run: np.ndarray,
-    steepness: np.ndarray,
-    contrast: float,
-    given: np.ndarray | None,
-) -> DropContour | None:
-    """Fit the baseline to the flanks beside the drop and give its points in that frame."""
-    first, last = xy[run[0]], xy[run[-1]]
-    if first[0] > last[0]:
-        run, first, last = run[::-1], last, first
-    width = last[0] - first[0]
-    # The substrate next to the drop counts; far away it may end or bend
-    near = flank & (xy[:, 0] > first[0] - 1.5 * width) & (xy[:, 0] < last[0] + 1.5 * width)
-    # A Gaussian blur of width s has the steepest slope contrast / (s sqrt(2 pi)); the
-    # smoothing before the contour was found is part of it
-    blur = contrast / np.sqrt(2 * np.pi) / np.median(steepness[run])
-    # Next to the contact the drop's blur lifts the substrate's contour
-    gap = min(6 * blur, 0.2 * width)
-    # ... and so does a belly that hangs over it
-    belly = (min(first[0], xy[run, 0].min()), max(last[0], xy[run, 0].max()))
-    for left, right in (belly, (first[0], last[0])):
-        sides = [near & (xy[:, 0] < left - gap), near & (xy[:, 0] > right + gap)]
-        if min(np.count_nonzero(side) for side in sides) >= 20:
-            break
-    middle = (first[0] + last[0]) / 2
-    if given is None:
-        if min(np.count_nonzero(side) for side in sides) < 8:
-            return None
-        ground = xy[sides[0] | sides[1]]
-        for _ in range(3):
-            slope, level = np.polyfit(ground[:, 0] - middle, ground[:, 1], 1)
-            residual = ground[:, 1] - slope * (ground[:, 0] - middle) - level
-            spread = 1.4826 * np.median(np.abs(residual)) + 0.02
-            ground = ground[np.abs(residual) < 3.5 * spread]
-        # Neighbouring points share blur and roughness: one in ten is independent
-        count = max(len(ground) / 10, 3)
-        lean_stderr = spread / np.sqrt(count) / np.std(ground[:, 0])
-        offset_stderr = spread / np.sqrt(count) + OFFSET_FLOOR + LEVEL_ERROR * blur
-    else:
-        slope = (given[1, 1] - given[0, 1]) / (given[1, 0] - given[0, 0])
-        level = given[0, 1] + slope * (middle - given[0, 0])
-        lean_stderr, offset_stderr = 0.0, 0.5
-    lean = float(np.arctan(slope))
-    direction = np.array([np.cos(lean), np.sin(lean)])
-    origin = np.array([middle, level])
-    along = (xy[run] - origin) @ direction
-    above = (xy[run] - origin) @ np.array([-direction[1], direction[0]])
-    contacts = origin + np.outer([along[0], along[-1]], direction)
-    return DropContour(
-        points=np.stack([along, above], axis=1),
-        baseline=np.stack([-contacts[:, 1], contacts[:, 0]], axis=1),
-        lean=lean,
-        lean_stderr=float(lean_stderr),
-        offset_stderr=float(offset_stderr),
-        blur=float(blur),
-    )

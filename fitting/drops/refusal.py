@@ -15,12 +15,18 @@ SIDE_MISFIT = 0.025
 # An interval wider than this says nothing. [rad]
 WIDEST = np.deg2rad(60)
 
+# Drop and image that turn less into each other may be one floating body. [rad]
+LEAST_KINK = np.deg2rad(12)
+
 _OTHER = "Crop to the drop (crop=), or give two points of its baseline (baseline=)."
 
 
 def why_no_drop(grey: np.ndarray, baseline: np.ndarray | None) -> tuple[str, str]:
     """Return what is wrong with a picture in which no drop was found, and the cure."""
     expected = "expected a drop on a straight substrate, found"
+    if baseline is not None and _stands(grey):
+        cure = "Check row and column of its two points, or leave baseline= out."
+        return "expected a drop on the given baseline, found none there", cure
     if _stands(np.rot90(grey, 2)):
         cure = "Turn the picture if it is upside down; hanging drops are not measured."
         where = "above it (a pendant drop, or a picture upside down)"
@@ -28,13 +34,17 @@ def why_no_drop(grey: np.ndarray, baseline: np.ndarray | None) -> tuple[str, str
     if (side := _cut_side(grey)) is not None:
         problem = f"{expected} one cut by the {side} side of the frame"
         return problem, "Take a picture, or a crop, that shows both contacts."
+    for side, margin, tone in (
+        ("top", (30, 0), grey.max()),
+        ("bottom", (0, 30), grey.min()),
+    ):
+        if _stands(np.pad(grey, (margin, (0, 0)), constant_values=tone)):
+            problem = f"{expected} one cut by the {side} of the frame"
+            return problem, "Take a picture that shows the whole drop and its substrate."
     for where, quarters in (("left", 1), ("right", 3)):
         if _stands(np.rot90(grey, quarters)):
             problem = f"{expected} one with its substrate on its {where}"
             return problem, "Turn the picture until the substrate is below the drop."
-    if baseline is not None and _stands(grey):
-        cure = "Check row and column of its two points, or leave baseline= out."
-        return "expected a drop on the given baseline, found none there", cure
     return f"{expected} none", _OTHER
 
 
@@ -100,3 +110,23 @@ def check_shape(
                 f"± {error:.0f} on the {side}"
             )
             raise DataFileError(name, problem, _OTHER)
+
+
+def check_kink(name: str | Path, sides: list[ShapeFit]) -> None:
+    """Refuse a body and its mirror image that meet without a kink: it may float.
+
+    Raises
+    ------
+    DataFileError
+        If the angle is 90 degrees within its error and a little more.
+    """
+    for side, fit in zip(("left", "right"), sides, strict=True):
+        if abs(fit.angle - np.pi / 2) < LEAST_KINK / 2 + 3 * fit.stderr:
+            problem = (
+                "expected a border of the substrate, or a kink of drop and image; they "
+                f"meet at {np.rad2deg(fit.angle):.0f} degrees on the {side}, as a drop of "
+                "90 degrees and a floating body do"
+            )
+            raise DataFileError(
+                name, problem, "Give two points of its baseline (baseline=)."
+            )

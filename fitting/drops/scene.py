@@ -6,10 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+# Share of what is dark that is taken for the darkest
+_DARKEST = 0.02
+
 
 @dataclass(frozen=True)
 class Scene:
-    """A picture scaled by its light: 1 on the ground, 0 at the median of what is dark.
+    """A picture scaled by its light: 1 on the ground, 0 at the darkest.
 
     `corner` is the row and column of its first pixel, `down` and `right` are its slopes,
     and `level` parts ground from substrate.
@@ -58,10 +61,13 @@ def thresholds_of(few: np.ndarray) -> list[float]:
 def scale_by_light(grey: np.ndarray, step: int, threshold: float) -> Scene | None:
     """Scale a picture by the light of its ground; None without contrast."""
     few = grey[::step, ::step]
-    bright = ndimage.gaussian_filter(few, 1.0) > threshold
+    smooth = ndimage.gaussian_filter(few, 1.0)
+    bright = smooth > threshold
     if bright.all() or not bright.any():
         return None
-    low, high = np.median(few[~bright]), np.median(few[bright])
+    # Weaker light makes all tones weaker: to count from a bright substrate instead of from
+    # the darkest would put one level at different shares of a border's contrast
+    low, high = np.quantile(smooth[~bright], _DARKEST), np.median(few[bright])
     if high - low < 0.02:
         return None
     light = _light(few, bright, high)

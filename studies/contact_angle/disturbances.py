@@ -8,14 +8,27 @@ from scipy.ndimage import gaussian_filter
 from examples.drop_picture import fill, meridian
 from fitting import contact_angle
 
-KINDS = ("plain", "grey substrate", "mirror image", "needle", "bright drop", "no drop")
+KINDS = (
+    "plain", "grey substrate", "mirror image", "needle", "bright drop", "no drop",
+    "perfect mirror", "curved substrate", "hidden foot", "given baseline",
+)  # fmt: skip
+# The baseline of these is given, as well as it can be named
+GIVEN = ("hidden foot", "given baseline")
 ROWS, COLUMNS = 360, 560
 
 
-def photograph(kind: str, angle: float, rng: np.random.Generator) -> np.ndarray:
-    """Return a picture, 8 bits; all but its kind is drawn from the generator."""
+def photograph(
+    kind: str, angle: float, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a picture, 8 bits, and row and column of two points of its baseline.
+
+    All but its kind and its angle is drawn from the generator.
+    """
     bond = rng.uniform(0, 1.5)
-    half = meridian(angle, bond)
+    # The substrate falls or rises from the line between the contacts
+    bend = np.deg2rad(rng.uniform(-5, 5)) if kind == "curved substrate" else 0.0
+    half = meridian(np.clip(angle + bend, 0.2, 2.95), bond)
+    bend = np.clip(angle + bend, 0.2, 2.95) - angle
     half = half * min(rng.uniform(60, 100) / half[:, 0].max(), 190 / half[-1, 1])
     outline = np.concatenate([(half * [-1, 1])[::-1], half[1:]])
     # x to the right and z up, from the middle of the base
@@ -30,12 +43,24 @@ def photograph(kind: str, angle: float, rng: np.random.Generator) -> np.ndarray:
 
     ground = np.full((ROWS, COLUMNS), 0.85)
     far = 2000.0
-    base = layer(np.array([[-far, 0], [far, 0], [far, -far], [-far, -far]]))
+    x = np.linspace(-far, far, 2001)
+    top = 0 * x
+    if kind == "curved substrate":
+        radius = half[-1, 0] / np.sin(abs(bend))
+        inside = np.minimum(np.abs(x), 0.9 * radius)
+        top = np.sqrt(radius**2 - inside**2) - np.sqrt(radius**2 - half[-1, 0] ** 2)
+        top = np.sign(bend) * top
+    elif kind == "hidden foot":
+        top = top + rng.uniform(0.02, 0.1) * half[-1, 1]
+    base = layer(np.concatenate([np.stack([x, top], 1), [[far, -far], [-far, -far]]]))
     tone = {"grey substrate": rng.uniform(0.2, 0.5), "mirror image": rng.uniform(0.6, 0.7)}
+    if kind == "perfect mirror":
+        tone[kind] = ground[0, 0]
     level = ground + (tone.get(kind, 0.06) - ground) * base
     if kind in tone:
         image = layer(drop * [1, -1])
-        level = level + (rng.uniform(0.06, 0.8 * tone[kind]) - level) * image * base
+        dark = 0.06 if kind == "perfect mirror" else rng.uniform(0.06, 0.8 * tone[kind])
+        level = level + (dark - level) * image * base
     if kind == "no drop":
         # A block with a slanting side
         w, h, slant = rng.uniform(40, 90), rng.uniform(40, 120), rng.uniform(0, 40)
@@ -50,7 +75,8 @@ def photograph(kind: str, angle: float, rng: np.random.Generator) -> np.ndarray:
         level = 0.95 - level
     level = level * (1 - rng.uniform(0, 0.15) * np.linspace(0, 1, COLUMNS))
     level = level + rng.uniform(0.005, 0.03) * rng.standard_normal(level.shape)
-    return np.clip(np.rint(255 * level), 0, 255).astype(np.uint8)
+    ends = np.array([[row + t * sin, column - t * cos] for t in (200.0, -200.0)])
+    return np.clip(np.rint(255 * level), 0, 255).astype(np.uint8), ends
 
 
 def main() -> None:
@@ -68,7 +94,10 @@ def main() -> None:
             rng = np.random.default_rng([seed, number])
             degrees = rng.uniform(15, 165)
             try:
-                found = contact_angle(photograph(kind, np.deg2rad(degrees), rng))
+                picture, line = photograph(kind, np.deg2rad(degrees), rng)
+                line = line + rng.uniform(-0.5, 0.5, line.shape)
+                given = line if kind in GIVEN else None
+                found = contact_angle(picture, baseline=given)
             except ValueError as error:
                 refused += 1
                 if kind != "no drop":

@@ -1,0 +1,151 @@
+"""Where a drop ends: baselines given and seen, mirror images, and feet out of sight."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize, special
+from scipy.spatial import cKDTree
+
+# A point of the baseline that a person names is right to this. [pixels]
+GIVEN_ERROR = 0.5
+# Chance that the border of the substrate is not where the drop ends, and how far off it
+# may then be. [1], [pixels]
+OTHER_BORDER = 0.1
+OTHER_REACH = 10.0
+# A foot that the front edge of a substrate hides, where nothing shows the contact: its
+# chance, and its most. A substrate that reaches two widths of the drop to the front, seen
+# from 1.7 degrees below its plane, hides 0.06 of the width. [1], [base widths], [heights]
+HIDDEN = 0.1
+HIDDEN_OF_WIDTH = 0.06
+HIDDEN_OF_HEIGHT = 0.2
+# Tones of a mirror image and of the substrate that differ so much show the contact
+SEEN = 0.05
+
+
+@dataclass(frozen=True)
+class Line:
+    """A baseline y = level + slope (x - middle), x to the right and y up. [pixels]"""
+
+    middle: float
+    level: float
+    slope: float
+    level_error: float
+    slope_error: float
+
+    def at(self, x: float) -> float:
+        """Height of the line at x. [pixels]"""
+        return self.level + self.slope * (x - self.middle)
+
+    @classmethod
+    def through(
+        cls, points: np.ndarray, middle: float, error: float = GIVEN_ERROR
+    ) -> "Line":
+        """Line through two points, each right to an error."""
+        (x0, y0), (x1, y1) = points
+        slope = (y1 - y0) / (x1 - x0)
+        level = y0 + slope * (middle - x0)
+        return cls(middle, level, slope, error, float(np.sqrt(2) * error / abs(x1 - x0)))
+
+
+def combine(given: Line, seen: Line, contacts: tuple[float, float]) -> Line:
+    """Return the baseline by a line that was given and one that the picture shows.
+
+    Where both agree to what a person can name, the border of the substrate is meant, whose
+    place is known better. It may be another border: of the front edge that hides the foot,
+    or of what is on the substrate. Both readings count by their likelihood.
+    """
+    apart = max(abs(given.at(x) - seen.at(x)) for x in contacts)
+    error = np.hypot(given.level_error, seen.level_error)
+    same = (1 - OTHER_BORDER) * np.exp(-((apart / error) ** 2) / 2)
+    same /= np.sqrt(2 * np.pi) * error
+    share = same / (same + OTHER_BORDER / (2 * OTHER_REACH))
+
+    def mixed(name: str) -> tuple[float, float]:
+        a, b = getattr(seen, name), getattr(given, name)
+        errors = getattr(seen, f"{name}_error"), getattr(given, f"{name}_error")
+        value = share * a + (1 - share) * b
+        spread = share * errors[0] ** 2 + (1 - share) * errors[1] ** 2
+        return value, float(np.sqrt(spread + share * (1 - share) * (a - b) ** 2))
+
+    level, level_error = mixed("level")
+    slope, slope_error = mixed("slope")
+    return Line(given.middle, level, slope, level_error, slope_error)
+
+
+def with_hidden_foot(
+    centre: float, error: float, rise: float, depth: float, chance: float
+) -> tuple[float, float]:
+    """95 % interval of an angle whose foot may be hidden.
+
+    Parameters
+    ----------
+    centre, error : float
+        The normal distribution of the angle by what is seen. [rad]
+    rise : float
+        Change of the angle for a baseline one pixel lower. [rad / pixel]
+    depth : float
+        Most that may be hidden; less is as likely. [pixels]
+    chance : float
+        That anything is hidden. [1]
+    """
+    error = max(error, 1e-9)
+    reach = rise * depth
+
+    def below(angle: float) -> float:
+        seen = special.ndtr((angle - centre) / error)
+        if chance <= 0 or abs(reach) < 1e-9:
+            return float(seen)
+        # The mean of normal distributions whose middle is spread evenly over the reach
+        ends = (np.array([angle - centre, angle - centre - reach])) / error
+        area = ends * special.ndtr(ends) + np.exp(-(ends**2) / 2) / np.sqrt(2 * np.pi)
+        hidden = (area[0] - area[1]) * error / reach
+        return float((1 - chance) * seen + chance * hidden)
+
+    far = 6 * error + abs(reach)
+    low, high = (
+        optimize.brentq(lambda a, p=p: below(a) - p, centre - far, centre + far)
+        for p in (0.025, 0.975)
+    )
+    return low, high
+
+
+def mirror_line(outline: np.ndarray) -> Line | None:
+    """Return the line that mirrors an outline onto itself, of a drop and its image.
+
+    Parameters
+    ----------
+    outline : ndarray, shape (n, 2)
+        Of both, closed or cut below by the frame; x to the right and y up. [pixels]
+    """
+    x, y = outline.T
+    span = float(np.ptp(y))
+    middle = float((x.min() + x.max()) / 2)
+    tree = cKDTree(outline)
+    few = outline[:: max(1, len(outline) // 400)]
+
+    def apart(level: float, slope: float) -> np.ndarray:
+        direction = np.array([1.0, slope]) / np.hypot(1.0, slope)
+        normal = np.array([-direction[1], direction[0]])
+        origin = np.array([middle, level])
+        below = few[(few - origin) @ normal < 0]
+        image = below - 2 * np.outer((below - origin) @ normal, normal)
+        return tree.query(image)[0]
+
+    # The image may be cut, and the drop may not: the line is in the lower half or middle
+    levels = np.arange(y.min() + 0.2 * span, y.max() - 0.3 * span, 1.0)
+    misses = [float(np.mean(apart(level, 0.0))) for level in levels]
+    if not misses:
+        return None
+    best = optimize.minimize(
+        lambda p: float(np.mean(apart(p[0], p[1] / span) ** 2)),
+        [levels[int(np.argmin(misses))], 0.0],
+        method="Nelder-Mead",
+        options={"xatol": 0.005, "fatol": 1e-6},
+    )
+    level, slope = best.x[0], best.x[1] / span
+    rest = apart(level, slope)
+    if len(rest) < 20 or np.sqrt(np.mean(rest**2)) > 0.02 * span + 0.5:
+        return None
+    # One point in ten is independent; a drop's image is no better than its optics
+    error = float(np.std(rest) + 0.3) / np.sqrt(max(len(rest) / 10, 3)) + 0.1
+    return Line(middle, level, slope, error, 2 * error / float(np.ptp(x)))
