@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-# Share of what is dark that is taken for the darkest
-_DARKEST = 0.02
+# Share of what is dark that is the darkest tone at least, and what of the contrast is one
+# tone
+_DARKEST, _ONE_TONE = 0.02, 0.25
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,9 @@ def scale_by_light(grey: np.ndarray, step: int, threshold: float) -> Scene | Non
         return None
     # Weaker light makes all tones weaker: to count from a bright substrate instead of from
     # the darkest would put one level at different shares of a border's contrast
-    low, high = np.quantile(smooth[~bright], _DARKEST), np.median(few[bright])
+    dark, high = smooth[~bright], np.median(few[bright])
+    darkest = np.quantile(dark, _DARKEST)
+    low = np.median(few[~bright][dark < darkest + _ONE_TONE * (high - darkest)])
     if high - low < 0.02:
         return None
     light = _light(few, bright, high)

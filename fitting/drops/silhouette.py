@@ -339,7 +339,7 @@ def _clear_of_corners(drop: DropContour) -> np.ndarray:
     """Where the substrate's border, which ends at the contact, is too far to matter."""
     x, height = drop.points.T
     # A hidden foot has its corners where the substrate's front edge begins
-    height = height - np.interp(x, x[[0, -1]], height[[0, -1]])
+    height = height - max(drop.off, 0.0)
     ends = min(x[0], x[-1]), max(x[0], x[-1])
     inside = np.minimum(x - ends[0], ends[1] - x).clip(min=0)
     return np.hypot(inside, height) > CORNER_BLURS * drop.blur + 1
