@@ -1,9 +1,10 @@
 """Where a drop ends: baselines given and seen, mirror images, and feet out of sight."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize, special
+from scipy import ndimage, optimize, special
 from scipy.spatial import cKDTree
 
 # A point of the baseline that a person names is right to this. [pixels]
@@ -18,6 +19,9 @@ OTHER_REACH = 10.0
 HIDDEN = 0.1
 HIDDEN_OF_WIDTH = 0.06
 HIDDEN_OF_HEIGHT = 0.2
+# An image is known to this against its drop, and may be inside it by so much where it is
+# weaker. [pixels]
+IMAGE_OPTICS, IMAGE_INSET = 0.3, 0.5
 # Tones of a mirror image and of the substrate that differ so much show the contact
 SEEN = 0.05
 
@@ -112,6 +116,9 @@ def with_hidden_foot(
 def mirror_line(outline: np.ndarray) -> Line | None:
     """Return the line that mirrors an outline onto itself, of a drop and its image.
 
+    The image may be weaker than the drop, so that its contour lies inside that of the drop
+    by a common distance, which is fitted too.
+
     Parameters
     ----------
     outline : ndarray, shape (n, 2)
@@ -122,30 +129,69 @@ def mirror_line(outline: np.ndarray) -> Line | None:
     middle = float((x.min() + x.max()) / 2)
     tree = cKDTree(outline)
     few = outline[:: max(1, len(outline) // 400)]
+    normals = _outward(outline)
 
-    def apart(level: float, slope: float) -> np.ndarray:
+    def mirrored(level: float, slope: float) -> tuple[np.ndarray, np.ndarray]:
         direction = np.array([1.0, slope]) / np.hypot(1.0, slope)
         normal = np.array([-direction[1], direction[0]])
         origin = np.array([middle, level])
         below = few[(few - origin) @ normal < 0]
         image = below - 2 * np.outer((below - origin) @ normal, normal)
-        return tree.query(image)[0]
+        return image, tree.query(image)[1]
+
+    def apart(level: float) -> float:
+        image, nearest = mirrored(level, 0.0)
+        return float(np.mean(np.hypot(*(image - outline[nearest]).T)))
 
     # The image may be cut, and the drop may not: the line is in the lower half or middle
     levels = np.arange(y.min() + 0.2 * span, y.max() - 0.3 * span, 1.0)
-    misses = [float(np.mean(apart(level, 0.0))) for level in levels]
-    if not misses:
+    if not levels.size:
         return None
-    best = optimize.minimize(
-        lambda p: float(np.mean(apart(p[0], p[1] / span) ** 2)),
-        [levels[int(np.argmin(misses))], 0.0],
-        method="Nelder-Mead",
-        options={"xatol": 0.005, "fatol": 1e-6},
-    )
-    level, slope = best.x[0], best.x[1] / span
-    rest = apart(level, slope)
-    if len(rest) < 20 or np.sqrt(np.mean(rest**2)) > 0.02 * span + 0.5:
+    start = np.array([levels[np.argmin([apart(at) for at in levels])], 0.0, 0.0])
+
+    def misses(level: float, slope: float) -> tuple[np.ndarray, np.ndarray]:
+        image, nearest = mirrored(level, slope)
+        n = normals[nearest]
+        turn = (image[:, 0] - middle) * n[:, 1] - (image[:, 1] - level) * n[:, 0]
+        moves = np.stack([2 * n[:, 1], 2 * turn, np.ones(len(n))], axis=1)
+        return np.sum((image - outline[nearest]) * n, axis=1), moves
+
+    found = _settle(misses, start)
+    if found is None or found[2] > 0.02 * span + 0.5:
         return None
-    # One point in ten is independent; a drop's image is no better than its optics
-    error = float(np.std(rest) + 0.3) / np.sqrt(max(len(rest) / 10, 3)) + 0.1
-    return Line(middle, level, slope, error, 2 * error / float(np.ptp(x)))
+    (level, slope, _), errors, _ = found
+    return Line(middle, float(level), float(slope), float(errors[0]), float(errors[1]))
+
+
+def _settle(
+    misses: Callable[[float, float], tuple[np.ndarray, np.ndarray]], start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float] | None:
+    """Return level, slope and inset of a mirror image, their errors, and the rms left."""
+    found = start
+    # An image that is inside by no more than a blur: a flat drop's line hangs on it
+    prior = np.diag([0.0, 0.0, 1 / IMAGE_INSET**2])
+    for _ in range(20):
+        rest, moves = misses(found[0], found[1])
+        rest = rest + found[2]
+        apart = np.abs(rest - np.median(rest))
+        scatter = 1.4826 * np.median(apart) + 0.05
+        # The frame and the blurred kink bend the ends of the image
+        kept = apart < 3.5 * scatter
+        if np.count_nonzero(kept) < 20:
+            return None
+        # One point in ten is independent; a drop's image is no better than its optics
+        weight = 1 / (10 * (scatter + IMAGE_OPTICS) ** 2)
+        covariance = np.linalg.inv(weight * moves[kept].T @ moves[kept] + prior)
+        step = covariance @ (weight * moves[kept].T @ rest[kept] + prior @ found)
+        found = found - step
+        if abs(step[0]) < 1e-4:
+            break
+    return found, np.sqrt(np.diag(covariance)), float(np.sqrt(np.mean(rest**2)))
+
+
+def _outward(outline: np.ndarray) -> np.ndarray:
+    """Return the normals of a contour, away from its middle."""
+    along = np.gradient(ndimage.gaussian_filter1d(outline, 2.0, axis=0), axis=0)
+    normals = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    normals /= np.maximum(np.hypot(*normals.T), 1e-9)[:, None]
+    return normals * np.sign(np.sum((outline - outline.mean(axis=0)) * normals))

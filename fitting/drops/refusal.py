@@ -34,13 +34,15 @@ def why_no_drop(grey: np.ndarray, baseline: np.ndarray | None) -> tuple[str, str
     if (side := _cut_side(grey)) is not None:
         problem = f"{expected} one cut by the {side} side of the frame"
         return problem, "Take a picture, or a crop, that shows both contacts."
-    for side, margin, tone in (
-        ("top", (30, 0), grey.max()),
-        ("bottom", (0, 30), grey.min()),
-    ):
-        if _stands(np.pad(grey, (margin, (0, 0)), constant_values=tone)):
-            problem = f"{expected} one cut by the {side} of the frame"
-            return problem, "Take a picture that shows the whole drop and its substrate."
+    for dark in (grey, grey.max() - grey):
+        for side, margin, tone in (
+            ("top", (30, 0), dark.max()),
+            ("bottom", (0, 30), dark.min()),
+        ):
+            if find_drops(np.pad(dark, (margin, (0, 0)), constant_values=tone), None):
+                problem = f"{expected} one cut by the {side} of the frame"
+                cure = "Take a picture that shows the whole drop and its substrate."
+                return problem, cure
     for where, quarters in (("left", 1), ("right", 3)):
         if _stands(np.rot90(grey, quarters)):
             problem = f"{expected} one with its substrate on its {where}"
