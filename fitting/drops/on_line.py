@@ -136,7 +136,8 @@ def _parabola(along: np.ndarray, above: np.ndarray) -> np.ndarray | None:
     step = max(1, len(along) // 2000)
     x, y = along[::step], above[::step]
     span = np.ptp(x)
-    best, best_count = None, 1.1 * np.count_nonzero(np.abs(y) < 1.5) + 40 / step
+    best = None
+    best_count = 1.1 * float(np.count_nonzero(np.abs(y) < 1.5)) + 40 / step
     for _ in range(400):
         chosen = rng.integers(0, len(x), 3)
         a, b, c = np.sort(x[chosen])
@@ -145,7 +146,7 @@ def _parabola(along: np.ndarray, above: np.ndarray) -> np.ndarray | None:
         curve = np.polyfit(x[chosen], y[chosen], 2)
         if abs(2 * curve[0] * span) > MAX_TURN:
             continue
-        count = np.count_nonzero(np.abs(y - np.polyval(curve, x)) < 1.5)
+        count = float(np.count_nonzero(np.abs(y - np.polyval(curve, x)) < 1.5))
         if count > best_count:
             best, best_count = curve, count
     if best is None:

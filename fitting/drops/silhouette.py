@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from data_io.micrograph.levels import load_grey
 from fitting.drops.baseline import HIDDEN_OF_HEIGHT, HIDDEN_OF_WIDTH, with_hidden_foot
-from fitting.drops.contour import DropContour, find_drops
+from fitting.drops.contour import find_drops
+from fitting.drops.on_line import DropContour
 from fitting.drops.refusal import check_kink, check_shape, why_no_drop
 from fitting.drops.shapes import ShapeFit, fit_arc, fit_laplace
 from fitting.estimate import Estimate

@@ -1,10 +1,18 @@
 """Surfaces that come as they were measured, mended before anything is made of them."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 if TYPE_CHECKING:
     from data_io import Profile
     from pbrdf import HeightMap
+
+
+@overload
+def mended_once(surface: "HeightMap") -> "HeightMap": ...
+
+
+@overload
+def mended_once(surface: "Profile") -> "Profile": ...
 
 
 def mended_once(surface: "Profile | HeightMap") -> "Profile | HeightMap":
