@@ -53,5 +53,5 @@ def find_profile_faults(
             sentence = f"{count} of {clean.size} points {verbs[count > 1]} {text}"
             mends.append(Mend(kind, count, sentence, where, kind in wanted))
     for one in mends:
-        warn_of(name, one, stacklevel=4)
+        warn_of(name, one, stacklevel=5)
     return tuple(mends)

@@ -387,7 +387,7 @@ def column_sizes(
         cure = "Head the columns, for example x_mm,z_um, or give unit=('mm', 'um')."
         raise DataFileError(path, problem, cure, line=line)
     if all(missing):
-        warn_missing_unit(path, stacklevel=5)
+        warn_missing_unit(path, stacklevel=6)
     return unit_size(pair[0] or "um"), unit_size(pair[1] or "um"), is_slope
 
 

@@ -100,7 +100,7 @@ def check_profile_scale(path: str | Path, x: np.ndarray, z: np.ndarray) -> None:
     if fault is not None:
         problem = fault[0].replace("field", "length").replace("pixel", "step")
         msg = f"{Path(path).name}: {problem}. Check the units of both columns (unit=)."
-        warnings.warn(msg, ScaleWarning, stacklevel=4)
+        warnings.warn(msg, ScaleWarning, stacklevel=3)
 
 
 def _fault(

@@ -202,6 +202,11 @@ def mend_profile(
     MendWarning
         For each kind that was found.
     """
+    return _mended(profile, kinds, name)
+
+
+def _mended(profile: Profile, kinds: str | Sequence[str], name: str) -> Profile:
+    """Leave out what is at fault, for the public functions that were called."""
     values = profile.z if profile.slope is None else profile.slope
     mends = find_profile_faults(profile.x, values, kinds=kinds, name=name)
     if not mends:
@@ -283,7 +288,7 @@ def read_profile(
     path = Path(path)
     found = _read_any(path, unit, columns, spacing, block)
     check_profile_scale(path, found.x, found.z)
-    return mend_profile(found, kinds=mend, name=path.name)
+    return _mended(found, mend, path.name)
 
 
 def _read_any(

@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
-from data_io import MissingUnitWarning, Profile, read_profile, write_profile
+from data_io import (
+    MendWarning,
+    MissingUnitWarning,
+    Profile,
+    ScaleWarning,
+    read_profile,
+    write_profile,
+)
 from pbrdf.errors import DataFileError
 
 FINITE = st.floats(-1e6, 1e6, allow_subnormal=False)
@@ -64,7 +71,11 @@ def test_round_trip_is_exact(tmp_path_factory, steps, data):
     z = data.draw(arrays(float, x.size, elements=FINITE))
     path = tmp_path_factory.mktemp("profile") / "p.csv"
     write_profile(Profile(x, z), path)
-    profile = read_profile(path)
+    # Such numbers can be slopes of no surface, or numbers far from the rest
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ScaleWarning)
+        warnings.simplefilter("ignore", MendWarning)
+        profile = read_profile(path, mend="none")
     assert_array_equal(profile.x, x)
     assert_array_equal(profile.z, z)
 

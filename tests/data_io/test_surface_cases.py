@@ -339,8 +339,10 @@ def test_profiles_leave_sentinels_and_spikes_out_or_name_them(tmp_path):
     assert_allclose(found.z, true[kept])
     assert_allclose(found.raw.z, z)
     assert [one.kind for one in found.mends] == ["sentinels", "spikes"]
-    with pytest.warns(MendWarning, match="left as they are; mend='spikes'"):
+    with pytest.warns(MendWarning) as caught:
         left = read_profile(path, mend="sentinels")
+    assert {one.filename for one in caught} == {__file__}
+    assert "left as they are; mend='spikes'" in str(caught[-1].message)
     assert left.size == 876
     # An edge is no spike, a flat step no sentinel, a random surface sound
     sound = np.where(x > 200, 3.0, 0.0) + 0.01 * rng.normal(size=900)
