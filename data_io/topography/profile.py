@@ -10,7 +10,7 @@ import numpy.typing as npt
 from data_io.mending.faults import Mend
 from data_io.mending.profile_faults import find_profile_faults
 from data_io.text.files import TEXT_SUFFIXES, is_text
-from data_io.text.text import Line, read_numbers, split_header
+from data_io.text.text import Line, Rows, find_delimiter, read_numbers, split_header
 from data_io.topography.columns import (
     Columns,
     column_sizes,
@@ -391,7 +391,8 @@ def read_text_profile(
         problem = "expected no spacing argument, the file has a column of positions"
         raise DataFileError(path, problem, "Leave the argument out.")
     else:
-        x = even_positions(rows[:, 0] * size_x)
+        place = _last_place(data, chosen.position.place)
+        x = even_positions(rows[:, 0] * size_x, place * size_x)
     known = np.isfinite(value) | ~np.isfinite(x)
     lines = [line for line, kept in zip(data.numbers, known, strict=True) if kept]
     return build_profile(path, x[known], value[known], lines=lines, is_slope=is_slope)
@@ -411,11 +412,24 @@ def _step(path: str | Path, header: list[Line], spacing: float | None) -> float:
     return float(step)
 
 
-def even_positions(x: np.ndarray) -> np.ndarray:
+def _last_place(data: Rows, column: int) -> float:
+    """Return the finest last digit that a column is printed with; 0 for exponents."""
+    delimiter = find_delimiter(data.first)
+    most = 0
+    for text in data.texts[:1000]:
+        cells = text.strip().split(delimiter)
+        cell = cells[column] if column < len(cells) else ""
+        if "e" in cell.lower():
+            return 0.0
+        most = max(most, len(cell.strip().partition(".")[2]))
+    return 10.0**-most
+
+
+def even_positions(x: np.ndarray, place: float) -> np.ndarray:
     """Return positions without the rounding of their digits, where they lie on a grid.
 
     A file with one decimal lists steps of 0.156 um as 0, 0.2, 0.3, 0.5. If all positions
-    lie within half their last digit of an even grid, that grid is meant.
+    lie within half their last digit, `place`, of an even grid, that grid is meant.
     """
     if x.size < 10 or not np.isfinite(x).all():
         return x
@@ -427,6 +441,8 @@ def even_positions(x: np.ndarray) -> np.ndarray:
         return x
     # Steps differ by the last digit and by nothing else
     digit = float(np.diff(steps).min())
+    if not np.isclose(digit, place, rtol=1e-3):
+        return x
     number = np.arange(x.size)
     slope, start = np.polyfit(number, x, 1)
     grid = x[0] + slope * number

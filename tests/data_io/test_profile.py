@@ -80,6 +80,16 @@ def test_round_trip_is_exact(tmp_path_factory, steps, data):
     assert_array_equal(profile.z, z)
 
 
+def test_uneven_positions_with_digits_to_spare_are_no_rounded_grid(tmp_path):
+    x = 2.0 * np.arange(10) - (np.arange(10) > 1)
+    rows = [f"{a:.1f},{i % 3}" for i, a in enumerate(x)]
+    path = write(tmp_path, "x_um,z_um\n" + "\n".join(rows))
+    assert_array_equal(read_profile(path).x, x)
+    # Printed without decimals the same may be steps of 1.9
+    path = write(tmp_path, "x_um,z_um\n" + "\n".join(rows).replace(".0,", ","))
+    assert read_profile(path).evenly_spaced
+
+
 def test_a_file_without_unit_is_micrometres_and_says_so(tmp_path):
     path = write(tmp_path, "0 1\n1 2\n2 0\n")
     with pytest.warns(MissingUnitWarning, match=r"edge\.csv.*micrometres.*unit=") as caught:
