@@ -97,7 +97,19 @@ def test_the_rule_sees_a_crossing() -> None:
 @pytest.mark.parametrize(
     ("package", "heavy"),
     [
-        ("pbrdf", ["casadi", "nlopt", "matplotlib", "skimage", "embreex", "typer"]),
+        (
+            "pbrdf",
+            [
+                "casadi",
+                "nlopt",
+                "matplotlib",
+                "skimage",
+                "embreex",
+                "typer",
+                "distributed",
+                "zarr",
+            ],
+        ),
         (
             "pbrdf.cli",
             ["casadi", "nlopt", "matplotlib", "skimage", "embreex", "numba", "xarray"],

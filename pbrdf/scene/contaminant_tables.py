@@ -1,7 +1,6 @@
 """Contaminants in TOML files: degrees, micrometres, drops per square millimetre."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -86,8 +85,7 @@ def read_contaminant(table: Mapping[str, Any], source: Path) -> Drops | Spheres 
     """
     table = dict(table)
     kind = kind_of(table, KINDS, PLACE, source)
-    known = {"material", *_KEYS[kind], *_WORDS[kind]}
-    check_keys(table, known, f"{PLACE} {kind}", source)
+    check_keys(table, contaminant_keys(kind), f"{PLACE} {kind}", source)
     check_present(table, _NEEDED[kind], f"{PLACE} {kind}", source)
     given: dict[str, Any] = {
         name: _from_file(key, table[key], unit, source)
@@ -107,33 +105,11 @@ def read_contaminant(table: Mapping[str, Any], source: Path) -> Drops | Spheres 
         raise DataFileError(source, problem, "See the documented keys.") from error
 
 
-def with_value(
-    contaminants: Sequence[Drops | Spheres | Film], key: str, value: float
-) -> tuple[Drops | Spheres | Film, ...]:
-    """Return the contaminants with another value, in the unit of the file.
-
-    Raises
-    ------
-    ValueError
-        Unless exactly one of them has a number under this key.
-    """
-    found = []
-    for number, one in enumerate(contaminants):
-        kind = next(name for name, cls in KINDS.items() if isinstance(one, cls))
-        name, unit = _KEYS[kind].get(key, ("", 1.0))
-        if name and np.ndim(getattr(one, name)) == 0 and getattr(one, name) is not None:
-            found.append((number, name, unit))
-    if len(found) != 1:
-        msg = (
-            f"{key} must be given by one contaminant of the scene to be varied, got "
-            f"{len(found)} that have it. Vary another key, or write one scene file each."
-        )
-        raise ValueError(msg)
-    number, name, unit = found[0]
-    listed = list(contaminants)
-    change: dict[str, Any] = {name: value * unit}
-    listed[number] = replace(listed[number], **change)
-    return tuple(listed)
+def contaminant_keys(kind: str) -> set[str]:
+    """Return the keys that a table [[contaminants]] of a kind may have."""
+    if kind not in KINDS:
+        return set()
+    return {"material", *_KEYS[kind], *_WORDS[kind]}
 
 
 def _in_file(value: Any, unit: float) -> Any:

@@ -21,7 +21,7 @@ from pbrdf.scene.toml_tables import (
 )
 from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, MeshSurface, Surface
 
-_SURFACE_KEYS = {
+SURFACE_KEYS = {
     "gaussian": {"shape", "spacing_um", "corr_length_um", "slope_rms", "height_rms_um"},
     "height_map": {"file", "heights_um", "spacing_um", "periodic", "labels"},
     "mesh": {"file", "vertices_um", "faces", "period_um", "labels", "unit"},
@@ -46,7 +46,17 @@ def load_scene(path: str | Path) -> Scene:
         If the file is not TOML, or a key is unknown, missing or has a wrong value.
     """
     source = Path(path)
-    document = read_toml(source)
+    return scene_of(read_toml(source), source)
+
+
+def scene_of(document: Mapping[str, Any], source: Path) -> Scene:
+    """Return the scene of a parsed file; `source` is where its other files lie, and named.
+
+    Raises
+    ------
+    DataFileError
+        If a key is unknown, missing or has a wrong value.
+    """
     surface = required(document, "surface", source)
     substrate = required(document, "substrate", source)
     try:
@@ -63,8 +73,8 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def _read_surface(table: dict[str, Any], source: Path) -> Surface:
-    kind = kind_of(table, _SURFACE_KEYS, "surface", source)
-    check_keys(table, _SURFACE_KEYS[kind], "surface", source)
+    kind = kind_of(table, SURFACE_KEYS, "surface", source)
+    check_keys(table, SURFACE_KEYS[kind], "surface", source)
     if kind == "flat":
         return HeightMap.flat(size=_pair(table.get("size_um", 1.0)))
     if kind == "mesh":
@@ -79,7 +89,7 @@ def _read_surface(table: dict[str, Any], source: Path) -> Surface:
             height_rms=table.get("height_rms_um"),
         )
     if kind == "measured":
-        check_present(table, sorted(_SURFACE_KEYS[kind] - {"quantiles"}), "surface", source)
+        check_present(table, sorted(SURFACE_KEYS[kind] - {"quantiles"}), "surface", source)
         return MeasuredSurface(
             shape=_pair(table["shape"]),
             spacing=_pair(table["spacing_um"]),

@@ -187,8 +187,8 @@ BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
     ),
     "incidence in words": (["simulate", "scene.toml", "--theta-i-deg", "steep"], "steep"),
     "a store that is not written": (
-        ["sweep", "scene.toml", "--vary", "slope_rms=0.1", "-o", "out.zarr"],
-        ".nc",
+        ["sweep", "scene.toml", "--vary", "slope_rms=0.1", "-o", "out.h5"],
+        ".zarr",
     ),
     "odd azimuth bins": (["simulate", "scene.toml", "--n-dphi", "45"], "--n-dphi"),
     "unknown stokes": (["simulate", "scene.toml", "--stokes", "V"], "--stokes"),
