@@ -12,7 +12,7 @@ from numpy.testing import assert_array_equal
 
 import pbrdf
 from pbrdf.sweeps import Sweep, layout, load_sweep, run_sweep, tasks
-from pbrdf.sweeps.forecast import forecast
+from pbrdf.sweeps.expectation import forecast
 from tests.sweeps.scenes import SWEEP, opened, written
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*:pbrdf.AccuracyWarning")

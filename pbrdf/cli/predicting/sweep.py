@@ -87,7 +87,7 @@ def command(
         msg = f"--output must end in .zarr (a store) or .nc, got {target_path.name!r}."
         raise ValueError(msg)
     if dry_run:
-        from pbrdf.sweeps.forecast import forecast
+        from pbrdf.sweeps.expectation import forecast
 
         for line in forecast(sweep, workers=workers).sentences():
             typer.echo(line)

@@ -51,7 +51,8 @@ class Forecast:
             f"{self.task_bytes / 1e6:.3g} MB in memory for each group at work."
         )
         yield (
-            f"Expected: {_duration(self.seconds)} of work, {_duration(self.seconds / busy)} "
+            f"Expected: {_duration(self.seconds)} of work, "
+            f"{_duration(self.seconds / busy)} "
             f"on {busy} {'cores' if busy > 1 else 'core'}, from a pilot run of the first "
             "and the last point."
         )
