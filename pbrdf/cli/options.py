@@ -294,6 +294,7 @@ _UNRECORDED = {
     "scan",
     "surface",
     "scene",
+    "source",
     "material_file",
     "output",
     "force",
