@@ -28,12 +28,13 @@ TAKES = ("columns", "azimuth_of_forward", "angles", "normalised")
 def looks_like(lines: list[Line]) -> bool:
     """Tell whether a line names a column that is known, or has separators."""
     content = without_comments(lines)
-    words = [
+    # Each word once: a line may hold a million cells that are alike
+    words = {
         cell.strip().strip('"')
         for line in content[:30]
         for mark in (",", ";", "\t", "|", None)
         for cell in line.text.split(mark)
-    ]
+    }
     return any(meaning_of(word) for word in words if word) or any(
         mark in line.text for line in content[:2] for mark in ",;\t|"
     )
