@@ -5,11 +5,9 @@ the Monte Carlo; the scan gives the gains of both curves. The uncertainty of the
 slope goes into every fitted number.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,13 +16,12 @@ import xarray as xr
 from fitting.checks.unread import what_is_not_read
 from fitting.models.cuts import plane_curves
 from fitting.models.simulated import SimulatedModel
+from fitting.quick import GAINS, Clock, Progress, QuickResult, first_look
 from fitting.readings.observations import Mask
 from fitting.readings.wavelengths import one_wavelength
 from fitting.result.fit_result import FitResult
 from fitting.run import fit
-from fitting.statistics.mended import mended_once
 from fitting.statistics.result import SurfaceStatistics
-from fitting.statistics.surface import surface_statistics
 from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene
 from pbrdf.errors import check_seed
 from pbrdf.validity import judge, roughness_of
@@ -37,30 +34,21 @@ if TYPE_CHECKING:
 
 __all__ = ["PipelineResult", "random_surface", "run_pipeline"]
 
-GAINS = ("specular_gain", "diffuse_albedo")
 # Cells a correlation length: facets then lie within 0.2 % of the surface they stand for
 CELLS = 12
 NODES = 256
 # What a simulation adds to the analytical curve holds for slopes so near to its own
 FAR = 0.1
 
-Progress = Callable[[str, int, int], None]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PipelineResult:
-    """What a surface and a scan say together.
+class PipelineResult(QuickResult):
+    """What a surface and a scan say together: `curves` are both fitted ones.
 
     Attributes
     ----------
-    surface : Profile or HeightMap
-        The measured surface.
-    statistics : SurfaceStatistics
-        Of it.
-    measurement : Dataset
-        The scan.
-    analytic : FitResult
-        The analytical curve brought to the scan at the measured slope.
+    surface, statistics, measurement, analytic, curves, seconds
+        As of `fitting.quick.QuickResult`.
     monte_carlo : FitResult
         The simulated curve, all bounces, brought to the scan at the measured slope.
     scan_slope : FitResult or None
@@ -68,24 +56,14 @@ class PipelineResult:
         where the slope is among the free parameters anyway.
     simulation : Dataset
         The Monte Carlo, for unit gain.
-    curves : Dataset, dims theta_i, theta_view
-        Both fitted curves in the plane of incidence, and the error of the simulation.
     unknown : tuple of str
         What these data cannot tell, in words.
-    seconds : mapping of str to float
-        Elapsed time by stage. [s]
     """
 
-    surface: "Profile | HeightMap"
-    statistics: SurfaceStatistics
-    measurement: xr.Dataset
-    analytic: FitResult
     monte_carlo: FitResult
     scan_slope: FitResult | None
     simulation: xr.Dataset
-    curves: xr.Dataset
     unknown: tuple[str, ...]
-    seconds: Mapping[str, float]
 
     @property
     def model(self) -> MicrofacetModel:
@@ -156,19 +134,14 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
         If the scan holds several wavelengths, or nothing that the fit can use.
     """
     check_seed(seed)
-    index = Material(*material.index(one_wavelength(measurement)), name=material.name)
     clock = Clock(progress or (lambda *_: None))
-
-    with clock.stage("surface statistics"):
-        statistics = surface_statistics(mended_once(surface), form=form)
-    free, priors = slope_knowledge(statistics, free)
-
     bring = partial(fit, mask=mask, accept=accept)
-    start = MicrofacetModel(
-        index, slope_rms=statistics.slope_rms.value, shadowing=shadowing
-    )
-    with clock.stage("analytical fit"):
-        analytic = bring(measurement, start, free=free, priors=priors)
+    look = first_look(
+        surface, measurement, bring, clock,
+        material=material, free=free, shadowing=shadowing, form=form,
+    )  # fmt: skip
+    statistics, free, priors = look.statistics, look.free, look.priors
+    analytic = look.analytic
 
     simulated = partial(
         _simulated, statistics, measurement, free,
@@ -262,19 +235,6 @@ def _simulated(
     )
 
 
-def slope_knowledge(
-    statistics: SurfaceStatistics, free: Sequence[str]
-) -> tuple[tuple[str, ...], dict[str, tuple[float, float]]]:
-    """Return what to fit and what the surface tells of the slope.
-
-    A slope that the surface does not determine is fitted to the scan instead.
-    """
-    slope = statistics.slope_rms
-    if np.isfinite(slope.stderr):
-        return tuple(free), {"slope_rms": (slope.value, slope.stderr)}
-    return tuple(dict.fromkeys((*free, "slope_rms"))), {}
-
-
 def _beyond_optics(
     measurement: xr.Dataset, statistics: SurfaceStatistics
 ) -> tuple[str, ...]:
@@ -284,20 +244,3 @@ def _beyond_optics(
         return ()
     rough = roughness_of(random_surface(statistics, statistics.slope_rms.value))
     return judge(rough, np.unique(measurement.theta_i.values), wavelength).notes
-
-
-@dataclass
-class Clock:
-    """Elapsed time by stage. [s]"""
-
-    report: Progress
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Time the block under this name."""
-        self.report(name, 0, 1)
-        begin = perf_counter()
-        yield
-        self.seconds[name] = perf_counter() - begin
-        self.report(name, 1, 1)

@@ -3,6 +3,7 @@
 import json
 import re
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.testing import assert_allclose
 
 import data_io
 from fitting import run_pipeline
+from fitting.quick import run_quick
 from fitting.report.layers import fitted_layers
 from pbrdf import GaussianSurface, HeightMap, Material, MicrofacetModel
 from pbrdf.cli import main
@@ -213,7 +215,10 @@ def test_each_wavelength_has_its_folder_and_a_place_in_the_spectrum(tmp_path: Pa
     assert np.rad2deg(read.scan_source_half_angle.values) == pytest.approx(0.5)
 
 
-def test_a_raw_map_is_mended_and_one_left_by_choice_is_not(tmp_path: Path) -> None:
+@pytest.mark.parametrize("whole_way", [run_pipeline, run_quick])
+def test_a_raw_map_is_mended_and_one_left_by_choice_is_not(
+    tmp_path: Path, whole_way: Callable[..., object]
+) -> None:
     """Also profiles; only the statistics are computed here."""
     true = GaussianSurface(
         shape=(160, 160), spacing=1.0, corr_length=12.0, slope_rms=0.3
@@ -234,7 +239,7 @@ def test_a_raw_map_is_mended_and_one_left_by_choice_is_not(tmp_path: Path) -> No
 
     def run(surface: object) -> None:
         with pytest.raises(Enough):
-            run_pipeline(surface, scan, material=Material(1.5), progress=stop)
+            whole_way(surface, scan, material=Material(1.5), progress=stop)
 
     with pytest.warns(data_io.MendWarning, match="in [0-9]+ bands of 0.6"):
         run(banded)
