@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Curve", "brightness", "curves_of", "noise_of"]
+__all__ = ["Curve", "brightness", "curves_of", "noise_of", "stderr_of"]
 
 # sin(theta_s) |sin(dphi)| of a reading that counts as in plane
 _PLANE = 2e-3
@@ -56,25 +56,27 @@ class Curve:
         return bool((np.abs(np.sin(self.dphi)) * np.sin(self.theta_s) < _PLANE).all())
 
 
+def stderr_of(scan: "xr.Dataset", name: str) -> np.ndarray:
+    """Return the stated errors of readings, NaN where there are none."""
+    column = f"{name}_stderr"
+    if column not in scan:
+        return np.full(scan.sizes["geometry"], np.nan)
+    return np.asarray(scan[column].values, float)
+
+
 def brightness(scan: "xr.Dataset") -> tuple[np.ndarray, np.ndarray] | None:
     """Return M00 and its standard error, or None where the scan has none.
 
     The sum of light behind two crossed polarisers is M00, that of four half-polarised
     readings f_ab twice M00.
     """
-    size = scan.sizes["geometry"]
     for parts, factor in (
         (("M00",), 1.0), (("I_s", "I_p"), 1.0), (("f_ss", "f_sp", "f_ps", "f_pp"), 0.5),
     ):  # fmt: skip
         if set(parts) <= set(scan.data_vars):
             value = factor * sum(np.asarray(scan[part].values, float) for part in parts)
-            errors = [
-                np.asarray(scan[f"{part}_stderr"].values, float)
-                if f"{part}_stderr" in scan
-                else np.full(size, np.nan)
-                for part in parts
-            ]
-            return np.asarray(value), factor * np.sqrt(sum(e**2 for e in errors))
+            squares = sum(stderr_of(scan, part) ** 2 for part in parts)
+            return np.asarray(value), factor * np.sqrt(squares)
     return None
 
 

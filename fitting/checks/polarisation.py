@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from data_io.goniometer.scatter import curve_keys, standard_errors
-from fitting.checks.curves import brightness
+from fitting.checks.curves import brightness, stderr_of
 from fitting.checks.finding import Finding
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def _errors_of(
     """Return M00, the error of |element| - M00, and whether the scatter had to tell it."""
     bright, stated = found
     curve, view = _curves(scan)
-    value, own = np.asarray(scan[name].values, float), _stderr(scan, name)
+    value, own = np.asarray(scan[name].values, float), stderr_of(scan, name)
     parts = (
         standard_errors(bright, stated, curve, view),
         standard_errors(value, own, curve, view, brightness=bright),
@@ -124,7 +124,7 @@ def _biased_dolp(scan: "xr.Dataset") -> list[Finding]:
     """
     if "DOLP" not in scan or "DOLP_stderr" not in scan:
         return []
-    value, stderr = np.asarray(scan["DOLP"].values, float), _stderr(scan, "DOLP")
+    value, stderr = np.asarray(scan["DOLP"].values, float), stderr_of(scan, "DOLP")
     weak = (value < 3.0 * stderr) & np.isfinite(value)
     if not weak.any():
         return []
@@ -139,14 +139,6 @@ def _biased_dolp(scan: "xr.Dataset") -> list[Finding]:
             cure="Give signed Q/I (column m10) in place of DOLP: it has no such bias.",
         )
     ]  # fmt: skip
-
-
-def _stderr(scan: "xr.Dataset", name: str) -> np.ndarray:
-    column = f"{name}_stderr"
-    size = scan.sizes["geometry"]
-    return (
-        np.asarray(scan[column].values, float) if column in scan else np.full(size, np.nan)
-    )
 
 
 def _place(scan: "xr.Dataset", row: int) -> str:
