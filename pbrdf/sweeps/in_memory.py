@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-import numpy as np
 import xarray as xr
 
 from pbrdf.sweeps.description import Sweep
@@ -23,11 +22,7 @@ def computed(
 ) -> tuple[xr.Dataset, Report]:
     """Compute a sweep into one dataset; the report tells warnings and failures."""
     layout = Layout.of(sweep)
-    lead = tuple(layout.sizes.values())
-    held = {
-        name: np.full(lead + v.shape, v.empty, v.dtype)
-        for name, v in layout.variables.items()
-    }
+    held = layout.empty(tuple(layout.sizes.values()))
     report = Report()
     for group in range(layout.n_groups):
         block, mark = compute(sweep, layout, group, worker_count(workers))

@@ -153,7 +153,10 @@ class Layout:
 
     def block(self, group: int) -> dict[str, np.ndarray]:
         """Return empty arrays for the results of a group."""
-        lead = tuple(s.stop - s.start for s in self.region(group))
+        return self.empty(tuple(s.stop - s.start for s in self.region(group)))
+
+    def empty(self, lead: tuple[int, ...]) -> dict[str, np.ndarray]:
+        """Return empty arrays for the results of so many points."""
         return {
             name: np.full(lead + v.shape, v.empty, v.dtype)
             for name, v in self.variables.items()

@@ -1,8 +1,14 @@
 """A small scene to sweep over, and what a store of it holds."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
 import xarray as xr
+
+from pbrdf.sweeps import layout, load_sweep, run_sweep
+from pbrdf.sweeps.report import Report
 
 SCENE = """
 [surface]
@@ -38,6 +44,20 @@ def written(folder: Path, sweep: str = SWEEP, scene: str = SCENE) -> Path:
     path = folder / "sweep.toml"
     path.write_text(sweep)
     return path
+
+
+@contextmanager
+def by_points() -> Iterator[None]:
+    """Give each point a group of its own, as points of long runs have."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(layout, "_MOST_SECONDS", 0.0)
+        yield
+
+
+def serial_run(folder: Path, sweep: str = SWEEP) -> Report:
+    """Compute a sweep into s.zarr point by point, without Dask."""
+    with by_points():
+        return run_sweep(load_sweep(written(folder, sweep)), folder / "s.zarr", workers=1)
 
 
 def opened(path: Path) -> xr.Dataset:

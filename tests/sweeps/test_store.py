@@ -11,27 +11,18 @@ import xarray as xr
 from numpy.testing import assert_array_equal
 
 import pbrdf
-from pbrdf.sweeps import Sweep, layout, load_sweep, run_sweep, tasks
+from pbrdf.sweeps import Sweep, load_sweep, run_sweep, tasks
 from pbrdf.sweeps.expectation import forecast
-from tests.sweeps.scenes import SWEEP, opened, written
+from tests.sweeps.scenes import SWEEP, opened, serial_run, written
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*:pbrdf.AccuracyWarning")
-
-
-@pytest.fixture
-def by_points(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A group for each point, as of a sweep of long runs."""
-    monkeypatch.setattr(layout, "_MOST_SECONDS", 0.0)
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The store of the serial run."""
     folder = tmp_path_factory.mktemp("whole")
-    patch = pytest.MonkeyPatch()
-    patch.setattr(layout, "_MOST_SECONDS", 0.0)
-    report = run_sweep(load_sweep(written(folder)), folder / "s.zarr", workers=1)
-    patch.undo()
+    report = serial_run(folder)
     assert (report.computed, report.kept, report.errors) == (6, 0, {})
     return folder
 

@@ -14,10 +14,13 @@ import distributed
 import pytest
 import xarray as xr
 
-from pbrdf.sweeps import layout, load_sweep, run_sweep, tasks
-from tests.sweeps.scenes import SWEEP, opened, written
+from pbrdf.sweeps import load_sweep, run_sweep, tasks
+from tests.sweeps.scenes import SWEEP, opened, serial_run, written
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*:pbrdf.AccuracyWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:.*:pbrdf.AccuracyWarning"),
+    pytest.mark.usefixtures("by_points"),
+]
 # 16 points, each a group of its own
 MANY = SWEEP.replace(
     "[0.05, 0.1, 0.2]", "[0.05, 0.07, 0.1, 0.14, 0.17, 0.2, 0.22, 0.25]"
@@ -26,18 +29,10 @@ MANY = SWEEP.replace(
 ALONE = "from pbrdf.sweeps import layout; layout._MOST_SECONDS = 0.0; "
 
 
-@pytest.fixture(autouse=True)
-def by_points(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(layout, "_MOST_SECONDS", 0.0)
-
-
 @pytest.fixture(scope="module")
 def serial(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("serial")
-    patch = pytest.MonkeyPatch()
-    patch.setattr(layout, "_MOST_SECONDS", 0.0)
-    run_sweep(load_sweep(written(folder, MANY)), folder / "s.zarr", workers=1)
-    patch.undo()
+    serial_run(folder, MANY)
     return folder / "s.zarr"
 
 
@@ -65,7 +60,6 @@ def test_a_full_disk_ends_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         with pytest.raises(OSError, match="No space left"):
             run_sweep(sweep, tmp_path / "s.zarr", workers=workers)
     monkeypatch.undo()
-    monkeypatch.setattr(layout, "_MOST_SECONDS", 0.0)
     assert run_sweep(sweep, tmp_path / "s.zarr", workers=1).computed == 6
 
 
