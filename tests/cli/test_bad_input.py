@@ -71,7 +71,7 @@ BAD_SCANS: dict[str, tuple[Callable[[], str | bytes], str]] = {
     "negative": (lambda: with_cell(5, 2, "-0.3"), "line 6, column M00"),
     "below the horizon": (lambda: with_cell(5, 1, "95"), "line 6, column theta_view_deg"),
     "contradictory": (lambda: SCAN + "30,-40,0.09,0.01\n", "line 17"),
-    "wrong delimiter": (lambda: SCAN.replace(",", "|"), "scan.csv"),
+    "wrong delimiter": (lambda: SCAN.replace(",", "~"), "scan.csv"),
     "no angles": (lambda: SCAN.replace("theta_view_deg", "position"), "scan.csv"),
     "column twice": (lambda: SCAN.replace("M10", "M00"), "column M00"),
     "in radians": (
