@@ -88,7 +88,9 @@ def standard_errors(
         rest = np.sqrt(np.maximum(off**2 - floor**2, 0.0)) / np.maximum(level, 1e-300)
         # A floor hides what scales with the reading in all but the brightest
         brightest = np.argsort(level)[-_ENOUGH:]
-        part = _MEDIAN * max(np.median(rest[group]) for group in (~dark, brightest))
+        # Readings of one level have no brighter half
+        groups = [rest[group] for group in (~dark, brightest)]
+        part = _MEDIAN * max(np.median(group) for group in groups if group.size)
         lit = np.nan_to_num(value if brightness is None else brightness)
         found = np.hypot(floor, part * np.maximum(lit, 0.0))
     if stated is None:

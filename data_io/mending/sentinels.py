@@ -17,8 +17,9 @@ _JUMP = 5.0
 _SMALLEST_PATCH = 6
 _FEWEST_VALUES = 40
 _SPIKE = 12.0
-# More spikes than this share are the texture itself
+# More spikes than this share, and than so many, are the texture itself
 _MOST_SPIKES = 0.005
+_FEW_SPIKES = 2
 _TO_RMS = 1.4826
 
 
@@ -139,7 +140,7 @@ def find_spikes(heights: Array) -> Array:
             break
         found |= new
         filled = np.where(new, around, filled)
-    return found if found.mean() <= _MOST_SPIKES else np.zeros_like(found)
+    return _unless_texture(found)
 
 
 def find_spikes_along(x: Array, values: Array) -> Array:
@@ -173,4 +174,10 @@ def find_spikes_along(x: Array, values: Array) -> Array:
     alone = (before * after > 0) & (least > 0.6 * np.abs(away))
     if usual > 0:
         found[1:-1] = alone & (np.abs(away) > _SPIKE * usual)
-    return found if found.mean() <= _MOST_SPIKES else np.zeros_like(found)
+    return _unless_texture(found)
+
+
+def _unless_texture(found: Array) -> Array:
+    """Return the spikes, or none where they are too many to be faults."""
+    few = found.sum() <= max(_MOST_SPIKES * found.size, _FEW_SPIKES)
+    return found if few else np.zeros_like(found)

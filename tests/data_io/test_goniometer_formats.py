@@ -13,6 +13,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from data_io import ConventionWarning, in_plane, read_goniometer
+from data_io.goniometer.scatter import standard_errors
 from pbrdf.errors import DataFileError
 
 FRED = """type bsdf_data
@@ -410,3 +411,13 @@ def test_table_is_reciprocal_and_mirror_symmetric_as_converted(ptfe):
         kept = sense * (m[:, i, j] + m[:, j, i])
         broken = sense * (m[:, i, j] - m[:, j, i])
         assert np.abs(broken.mean()) < 0.2 * np.abs(kept.mean()), (i, j)
+
+
+def test_readings_of_one_level_have_standard_errors():
+    """A Lambertian scan has no brighter half."""
+    view = np.linspace(-80.0, 80.0, 33)
+    curve = np.zeros(view.size, dtype=int)
+    assert_array_equal(standard_errors(np.full(33, 0.2), None, curve, view), 0.0)
+    noise = 0.01 * np.random.default_rng(3).standard_normal(33)
+    found = standard_errors(0.2 + noise, None, curve, view, brightness=np.full(33, 0.2))
+    assert 0.006 < np.median(found) < 0.02

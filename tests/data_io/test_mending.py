@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from data_io import MendedMap, MendWarning, mend_map
+from data_io.mending.sentinels import find_spikes_along
 from pbrdf import HeightMap
 
 
@@ -130,3 +131,12 @@ def test_terraces_are_drawn_with_their_uncertainty():
 def test_an_unknown_kind_is_refused():
     with pytest.raises(ValueError, match=r"mend must be all, none or some .* 'dust'"):
         mend_map(HeightMap(TRUE, 1.0), kinds="spikes,dust")
+
+
+@pytest.mark.parametrize("size", [20, 60, 199])
+def test_one_jump_of_a_short_profile_is_found(size):
+    x = np.arange(float(size))
+    z = np.sin(x / 4)
+    z[7] += 9
+    assert_array_equal(np.flatnonzero(find_spikes_along(x, z)), 7)
+    assert not find_spikes_along(x, np.sin(x / 4)).any()

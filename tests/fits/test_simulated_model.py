@@ -343,7 +343,7 @@ def test_the_command_wants_one_surface(
 def test_only_the_simulation_is_unbiased_on_light_of_all_bounces() -> None:
     scans = [simulated_scan(seed) for seed in range(8)]
     bias, ratio = {}, {}
-    for title, tried in models(realizations=160).items():
+    for title, tried in models().items():
         results = [fit(one, tried, free=tuple(TRUTH)) for one in scans]
         bias[title] = {name: row[3] for name, row in pulls(results).items()}
         ratio[title] = np.mean([result.chi2 / result.dof for result in results])
@@ -351,6 +351,7 @@ def test_only_the_simulation_is_unbiased_on_light_of_all_bounces() -> None:
     assert max(abs(value) for value in bias["Monte Carlo"].values()) < 4.0, bias
     assert bias["analytical"]["specular_gain"] > 15.0
     assert bias["analytical"]["n"] < -8.0
-    # and only one of them fits within the errors; 8 scans of 440 readings know it to 2.4 %
+    # and only one of them fits within the errors; 8 scans of 440 readings know it to 2.4 %,
+    # the noise of 320 realisations adds 3 % (of 160: 10 %)
     assert abs(ratio["Monte Carlo"] - 1.0) < 0.12
     assert ratio["analytical"] > 1.4

@@ -232,7 +232,9 @@ def test_light_through_a_porous_sheet_is_transmitted():
     assert result.albedo.sum().item() + result.transmitted.item() == pytest.approx(1.0)
 
 
-@pytest.mark.filterwarnings("ignore:The tangent plane errs")
+@pytest.mark.filterwarnings(
+    "ignore:The tangent plane errs", "ignore:.*such roughness diffracts"
+)
 def test_many_wavelengths_take_one_trace():
     waves = np.linspace(0.4, 0.9, 12)
     glass = Material.from_table(wavelength=[0.4, 0.9], n=[1.6, 1.4], kappa=[0.2, 0.0])
