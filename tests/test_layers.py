@@ -20,6 +20,7 @@ KERNEL_IMPORTS = {
     "__future__",
     "cmath",
     "collections",
+    "filelock",  # one process compiles a kernel
     "hashlib",
     "math",
     "numba",

@@ -3,7 +3,9 @@
 Kernels know no strings, files, units or frames other than those of the conventions page.
 `jit` compiles them and keeps the result on disk. Numba does not notice an edited callee in
 another file, so the cache folder is named after a hash of every kernel source and of the
-Numba version: editing any kernel starts a fresh cache.
+Numba version: editing any kernel starts a fresh cache. Of several processes that want one
+kernel, one compiles it and the others wait: Numba's index of what it keeps is read and
+written back without a lock, and two that write at once can leave code under another's key.
 """
 
 import hashlib
@@ -15,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from filelock import FileLock
+from numba.core.compiler_lock import global_compiler_lock
 
 __all__ = ["cache_folder", "compiled_callback", "jit", "kernel_sources"]
 
@@ -74,7 +78,10 @@ def jit(
     settings: Any = {"nogil": True, "cache": _KEPT, "error_model": "numpy"} | options
     if not allocates:
         settings["_nrt"] = False
-    return _keeping(lambda: numba.njit(**settings)(function))
+    kernel = _keeping(lambda: numba.njit(**settings)(function))
+    if _KEPT and hasattr(kernel, "compile"):  # not with NUMBA_DISABLE_JIT
+        _let_one_process_compile(kernel)
+    return kernel
 
 
 def compiled_callback(function: Callable[..., Any], signature: Any) -> Any:
@@ -96,3 +103,21 @@ def _keeping(compiled: Callable[[], Any]) -> Any:
         return compiled()
     finally:
         config.CACHE_DIR = previous
+
+
+def _let_one_process_compile(kernel: Any) -> None:
+    """Hold a lock of the kernel's own while it is looked up, compiled and kept.
+
+    Numba's lock between threads comes first, as it does in every thread. A kernel waits
+    only for those that it calls, and no two call each other, so no two wait for each other.
+    """
+    function = kernel.py_func
+    name = f"{function.__module__}.{function.__qualname__}.lock"
+    lock = FileLock(_FOLDER / name, is_singleton=True)
+    compile_ = kernel.compile
+
+    def alone(signature: Any) -> Any:
+        with global_compiler_lock, lock.acquire(poll_interval=0.01):
+            return compile_(signature)
+
+    kernel.compile = alone

@@ -73,3 +73,57 @@ def test_an_edited_callee_in_a_sub_folder_gives_the_new_answer(
         answers.append(float(run.stdout))
         assert ("PBRDF_CACHE_DIR" in run.stderr) == (cache == "refused")
     assert answers == [6.0, 10.0]
+
+
+COUNTED = """
+import sys
+from pathlib import Path
+from pbrdf.kernels import jit
+
+
+@jit
+def half(x):
+    return x / 2
+
+
+@jit
+def cube(x):
+    return half(x * x * x)
+
+
+Path(sys.argv[1], "ready-" + sys.argv[2]).touch()
+while len(list(Path(sys.argv[1]).glob("ready-*"))) < 4:
+    pass
+argument = {"0": 2, "1": 2.0, "2": 2, "3": 2 + 0j}[sys.argv[2]]
+print(cube(argument), sum(cube.stats.cache_misses.values()), flush=True)
+"""
+
+
+def test_processes_that_start_at_once_compile_each_kernel_once(tmp_path: Path) -> None:
+    """Without the lock two compile the same, and the index names one of three entries."""
+    script = tmp_path / "counted.py"
+    script.write_text(COUNTED)
+    environment = os.environ | {
+        "PBRDF_CACHE_DIR": str(tmp_path / "cache"),
+        "PYTHONPATH": str(ROOT),
+    }
+
+    def answers(folder: Path) -> list[list[str]]:
+        folder.mkdir()
+        runs = [
+            subprocess.Popen(
+                [sys.executable, str(script), str(folder), str(k)],
+                stdout=subprocess.PIPE,
+                text=True,
+                env=environment,
+            )
+            for k in range(4)
+        ]
+        return [run.communicate(timeout=300)[0].split() for run in runs]
+
+    first, second = answers(tmp_path / "cold"), answers(tmp_path / "warm")
+    for found in first, second:
+        assert [complex(value) for value, _ in found] == [4] * 4
+    # Four processes, three kinds of argument
+    assert sum(int(misses) for _, misses in first) == 3
+    assert sum(int(misses) for _, misses in second) == 0
