@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from pbrdf.scene.scene import Scene
     from pbrdf.signatures.run import signature
     from pbrdf.simulation.run import simulate
+    from pbrdf.stored import from_store
     from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, MeshSurface
     from pbrdf.surface.mesh import morphologies
     from pbrdf.wave import WaveModel
@@ -39,6 +40,7 @@ __all__ = [
     "Spheres",
     "WaveModel",
     "compare_dew",
+    "from_store",
     "load_scene",
     "materials",
     "morphologies",
@@ -63,6 +65,7 @@ _HOME = {
     "Spheres": "pbrdf.contaminants",
     "WaveModel": "pbrdf.wave",
     "compare_dew": "pbrdf.dew",
+    "from_store": "pbrdf.stored",
     "load_scene": "pbrdf.scene.read",
     "observe": "pbrdf.observation.run",
     "signature": "pbrdf.signatures.run",

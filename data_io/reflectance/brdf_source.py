@@ -61,10 +61,11 @@ def from_dataset(dataset: xr.Dataset) -> Brdf:
 
 def _total(dataset: xr.Dataset) -> xr.DataArray:
     """Return the BRDF of all bounces, dims (wavelength, theta_i, theta_s, dphi, Stokes)."""
-    if "brdf" not in dataset:
+    name = "brdf" if "brdf" in dataset else "brdf_total"
+    if name not in dataset:
         msg = f"source must hold the variable brdf, got {list(dataset.data_vars)}."
         raise ValueError(msg)
-    brdf = dataset["brdf"]
+    brdf = dataset[name]
     if "bounces" in brdf.dims:
         brdf = brdf.sum("bounces")
     if "phi_i" in brdf.dims:

@@ -178,6 +178,12 @@ Wavelength = Annotated[
         "--wavelength-um", min=0.01, max=1e3, help="Use only rows of this wavelength."
     ),
 ]
+At = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="NAME=VALUE of what a sweep varied, once for each name, in the store's units."
+    ),
+]
 Free = Annotated[
     str,
     typer.Option(

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pbrdf.optics.materials import Material
     from pbrdf.surface.heightmap import HeightMap
 
-__all__ = ["read_material", "read_scan", "read_surface"]
+__all__ = ["read_material", "read_scan", "read_store", "read_surface"]
 
 _IMAGES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 _TEXT = {".csv", ".txt", ".asc", ".dat", ".tsv", ".xyz"}
@@ -177,3 +177,34 @@ def _kind(path: Path, columns: str | None, block: int | None) -> Kind:
         # Instruments write binary files of these names too; the reader says what is wrong
         return Kind.map
     return Kind.profile if profile else Kind.map
+
+
+def read_store(
+    path: Path,
+    at: list[str] | None,
+    *,
+    wavelength: float | None = None,
+    theta_i: float | None = None,
+) -> "xr.Dataset":
+    """Interpolate the store of a sweep at NAME=VALUE of each thing that varied.
+
+    Values are in the units of the store's names; those of text are taken as text.
+
+    Raises
+    ------
+    ValueError
+        If a word is no NAME=VALUE, or the store has no such place.
+    """
+    from pbrdf import from_store
+
+    places: dict[str, float | str] = {}
+    for text in at or ():
+        name, equals, value = text.partition("=")
+        if not equals or not name.strip() or name.strip() in places:
+            msg = f"--at must be NAME=VALUE, once for each name, got {text!r}."
+            raise ValueError(msg)
+        try:
+            places[name.strip()] = float(value)
+        except ValueError:
+            places[name.strip()] = value.strip()
+    return from_store(path).at(theta_i, wavelength, **places)

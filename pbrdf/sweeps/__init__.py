@@ -1,4 +1,4 @@
-"""Sweeps: many scenes into one Zarr store, and the store as a BRDF."""
+"""Sweeps: many scenes into one Zarr store; `pbrdf.stored` opens it as a BRDF."""
 
 from typing import TYPE_CHECKING
 

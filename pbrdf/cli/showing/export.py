@@ -31,7 +31,10 @@ MESHES = (".glb", ".stl", ".ply")
 def command(
     source: Annotated[
         Path,
-        typer.Argument(help="Result (.nc), model or scene (.toml).", show_default=False),
+        typer.Argument(
+            help="Result (.nc), store of a sweep (.zarr), model or scene (.toml).",
+            show_default=False,
+        ),
     ],
     output: Annotated[
         Path,
@@ -55,11 +58,13 @@ def command(
     convention: Annotated[
         Convention, typer.Option(help="Of a .csv: whose signs, frames and azimuths.")
     ] = Convention.pbrdf,
+    at: options.At = None,
 ) -> None:
     """Write a BRDF for a renderer or as a table, or a scene as a mesh.
 
     A table of a model has the incidences of --theta-i-deg and the hemisphere by 5 degrees;
-    that of a result has the bins of the result.
+    that of a result or of a store has its incidences and bins. A store is interpolated at
+    the values of --at.
 
     With --convention the columns bear its name; `pbrdf` reads none but its own again.
 
@@ -73,12 +78,42 @@ def command(
     if output.suffix in MESHES:
         export_mesh(source, output, base, seed, force=force)
         return
+    _check(source, output, convention, at)
+    accuracy = None
+    with staged_file(output, force=force) as stage:
+        model = data_io.read_model(source) if source.suffix == ".toml" else None
+        if output.suffix == ".csv":
+            rows = (
+                as_rows(_result(source, at, wavelength))
+                if model is None
+                else model_rows(model, options.incidences(theta_i), wavelength)
+            )
+            write_table(rows, stage, convention)
+        else:
+            accuracy = _renderer_file(source, model, at, wavelength, stage)
+            beside = stage.with_name(f"{stage.name}.json")
+            beside.replace(output.with_name(f"{output.name}.json"))
+    typer.echo(f"Written: {output}")
+    for line in () if accuracy is None else _accuracy_lines(accuracy):
+        typer.echo(line)
+
+
+def _check(
+    source: Path, output: Path, convention: Convention, at: list[str] | None
+) -> None:
+    """Refuse what cannot be written."""
     if output.suffix not in (".pbsdf", ".csv"):
         known = ", ".join((".pbsdf", ".csv", *MESHES))
         msg = f"--output must end in one of {known}, got {output.name!r}."
         raise ValueError(msg)
-    if source.suffix not in (".nc", ".toml"):
-        msg = f"source must be a result (.nc) or a model (.toml), got {source.name!r}."
+    if source.suffix not in (".nc", ".zarr", ".toml"):
+        msg = (
+            "source must be a result (.nc), a store (.zarr) or a model (.toml), got "
+            f"{source.name!r}."
+        )
+        raise ValueError(msg)
+    if at and source.suffix != ".zarr":
+        msg = f"--at must be left out, it is for a store of a sweep, got {source.name!r}."
         raise ValueError(msg)
     if convention is not Convention.pbrdf and output.suffix != ".csv":
         msg = (
@@ -86,25 +121,32 @@ def command(
             f"{convention.value}."
         )
         raise ValueError(msg)
-    accuracy = None
-    with staged_file(output, force=force) as stage:
-        if source.suffix == ".toml":
-            model = data_io.read_model(source)
-            if output.suffix == ".csv":
-                incidences = options.incidences(theta_i)
-                write_table(model_rows(model, incidences, wavelength), stage, convention)
-            else:
-                accuracy = data_io.export_mitsuba(model, stage, wavelength=wavelength)
-        elif output.suffix == ".csv":
-            write_table(as_rows(data_io.read_result(source)), stage, convention)
-        else:
-            accuracy = data_io.export_mitsuba(data_io.read_result(source), stage)
-        if accuracy is not None:
-            beside = stage.with_name(f"{stage.name}.json")
-            beside.replace(output.with_name(f"{output.name}.json"))
-    typer.echo(f"Written: {output}")
-    for line in () if accuracy is None else _accuracy_lines(accuracy):
-        typer.echo(line)
+
+
+def _renderer_file(
+    source: Path,
+    model: "MicrofacetModel | None",
+    at: list[str] | None,
+    wavelength: float | None,
+    stage: Path,
+) -> "xr.Dataset":
+    """Write a .pbsdf; return how far it is from its source."""
+    import data_io
+
+    if model is None:
+        return data_io.export_mitsuba(_result(source, at, wavelength), stage)
+    return data_io.export_mitsuba(model, stage, wavelength=wavelength)
+
+
+def _result(source: Path, at: list[str] | None, wavelength: float | None) -> "xr.Dataset":
+    """Return a result, or a store at one value of each thing that varied."""
+    import data_io
+
+    if source.suffix == ".zarr":
+        from pbrdf.cli.reading import read_store
+
+        return read_store(source, at, wavelength=wavelength)
+    return data_io.read_result(source)
 
 
 def write_table(rows: "xr.Dataset", path: Path, convention: Convention) -> None:

@@ -3,7 +3,7 @@
 import math
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +11,7 @@ from pbrdf.cli import declaring, options
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 
 class Scale(StrEnum):
@@ -26,7 +27,9 @@ def command(
     source: Annotated[
         Path,
         typer.Argument(
-            help="Result (.nc), scene (.toml) or goniometer file.", show_default=False
+            help="Result (.nc), store of a sweep (.zarr), scene (.toml) or goniometer "
+            "file.",
+            show_default=False,
         ),
     ],
     output: options.Output = None,
@@ -51,7 +54,7 @@ def command(
         list[str] | None,
         typer.Option(
             help="NAME=VALUE where a result has more dimensions, as phi_i_deg=90 or what "
-            "a sweep varied, one that was computed."
+            "a sweep varied: one that was computed, of a store any between."
         ),
     ] = None,
     elements: Annotated[
@@ -99,6 +102,11 @@ def command(
                     result, names, errors=errors, minus=minus, scale=scale.value,
                     width_mm=width_mm, places=places,
                 )  # fmt: skip
+        elif source.suffix == ".zarr":
+            figure = _of_store(
+                source, at, theta_i, wavelength, options.names(elements), plane=plane,
+                scale=scale.value, width_mm=width_mm,
+            )  # fmt: skip
         elif source.suffix == ".toml":
             from pbrdf import load_scene
             from pbrdf.plots.bodies import scene_picture
@@ -117,6 +125,32 @@ def command(
             figure = scan_figure(scan, width_mm=width_mm)
         figure.savefig(stage, dpi=200)
     typer.echo(f"Figure: {target}")
+
+
+def _of_store(
+    source: Path,
+    at: list[str] | None,
+    theta_i: float | None,
+    wavelength: float | None,
+    elements: tuple[str, ...],
+    *,
+    plane: bool,
+    **look: Any,
+) -> "Figure":
+    """Draw a store at one value of each thing that varied."""
+    from pbrdf.cli.reading import read_store
+    from pbrdf.plots import hemisphere, plane_cuts
+
+    incidence = None if theta_i is None else math.radians(theta_i)
+    here = read_store(source, at, wavelength=wavelength, theta_i=incidence)
+    if plane:
+        return plane_cuts(here, elements, **look)
+    first = {
+        name: here[name].values[0]
+        for name in ("theta_i", "wavelength")
+        if name in here.dims
+    }
+    return hemisphere(here, elements, fold=False, places=first, **look)
 
 
 def _place(text: str) -> tuple[str, float]:
