@@ -7,12 +7,16 @@ its own slope, blurred per axis by its diffraction,
    b = \frac{1}{2 s q_z} = \frac{\lambda}{8 \pi s}
 
 at normal incidence (q_z = 4 pi / lambda). A large patch hides the slopes within it, a
-small one diffracts. On the patch where both are equal the blur gives back the variance
-that the smoothing took. On a smooth map the patch is large against the
-wavelength and small against the surface, and both vanish beside the slopes.
+small one diffracts. At each place the patch is taken on which both are equal: the blur
+then gives back the variance that the smoothing took, and the lobe of the patch is as narrow
+as it can be. Where the surface is smooth the patch is large and its lobe sharp; where it is
+rugged the patch is small. On a smooth map both vanish beside the slopes. Over a brushed map
+patches are longer along the grooves, so that each axis gets back what it lost.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
@@ -24,15 +28,17 @@ Array = np.ndarray
 
 # Principal slopes that differ by less than this factor are those of an isotropic surface
 _ISOTROPIC = 1.2
-# Width of a radial bin beside the rms slope
+# Width of a radial bin, and of the kernel of a table over both axes, beside the rms slope
 _BIN = 0.1
+_KERNEL = 0.15
 _NODES = 161
 # Facets beyond this share of all lie in the last cells of the table
 _WITHIN = 0.9995
-# Nodes an axis from which the size of patches is found
-_ENOUGH = 512
-# Patches are sought between a twentieth of a wavelength and this many
+# Patches are sought between a twentieth of a wavelength and this many, each so much larger
 _LARGEST = 20.0
+_RATIO = 1.1
+# Facets left when the search ends; the largest patch so far takes them
+_REST = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,20 +48,40 @@ class Facets:
     Parameters
     ----------
     slope_x, slope_y : ndarray, shape (n,)
-        Of the patches, about the mean plane. [1]
-    patch : float
-        Standard deviation of their Gaussian weight. [um]
-    blur : float
-        Diffraction of a patch, per axis. [1]
-    hidden : float
-        Rms slope within a patch, per axis. [1]
+        Of the patches, about the mean plane; those of one size together. [1]
+    sizes, counts : ndarray, shape (k,)
+        Standard deviation of the Gaussian weight of the patches, and how many there are of
+        each. [um]
+    wavelength : float
+        In vacuum. [um]
+    aspect : float
+        Length of the patches along y over that along x; `sizes` is their geometric mean.
     """
 
     slope_x: Array
     slope_y: Array
-    patch: float
-    blur: float
-    hidden: float
+    sizes: Array
+    counts: Array
+    wavelength: float
+    aspect: float = 1.0
+
+    @property
+    def patch(self) -> float:
+        """Median size. [um]"""
+        half = np.searchsorted(np.cumsum(self.counts), self.counts.sum() / 2)
+        return float(self.sizes[half])
+
+    @property
+    def blurs(self) -> Array:
+        """Diffraction of each size along x and y, shape (k, 2). [1]"""
+        turned = np.array([self.aspect**0.5, self.aspect**-0.5])
+        return diffraction(self.sizes, self.wavelength)[:, None] * turned
+
+    @property
+    def blur(self) -> float:
+        """Rms diffraction of the patches, per axis. [1]"""
+        square = np.mean(self.blurs**2, axis=1)
+        return float(np.sqrt(np.average(square, weights=self.counts)))
 
     @property
     def slope_rms(self) -> float:
@@ -63,62 +89,128 @@ class Facets:
         square = (np.mean(self.slope_x**2) + np.mean(self.slope_y**2)) / 2
         return float(np.sqrt(square + self.blur**2))
 
+    @cached_property
+    def principal(self) -> tuple[Array, Array]:
+        """Rms slopes along the principal axes, and the axes as columns; equal if nearly."""
+        slopes = np.stack([self.slope_x, self.slope_y])
+        values, axes = np.linalg.eigh(slopes @ slopes.T / slopes.shape[1])
+        if values[1] < _ISOTROPIC**2 * values[0]:
+            values = np.full(2, values.mean())
+        return np.sqrt(np.maximum(values, 1e-16)), axes
 
-def smooth_slopes(surface: HeightMap, smoothing: float = 0.0) -> tuple[Array, Array]:
-    """Slopes of a map about its mean plane after a Gaussian smoothing [um].
+    @cached_property
+    def radius(self) -> Array:
+        """|slope| of each facet in units of its rms along the principal axes. [1]"""
+        widths, axes = self.principal
+        return np.hypot(*((axes / widths).T @ np.stack([self.slope_x, self.slope_y])))
 
-    Cells near missing heights, and near the rim of the smoothed map, are left out.
+    def groups(self) -> Iterator[tuple[Array, slice]]:
+        """Yield the blur along x and y, and the facets, of each size. [1]"""
+        ends = np.cumsum(self.counts)
+        for blur, begin, end in zip(self.blurs, ends - self.counts, ends, strict=True):
+            yield blur, slice(int(begin), int(end))
+
+
+def facets_of(
+    surface: HeightMap,
+    wavelength: float,
+    *,
+    criterion: float = 1.0,
+    resolution: float = 0.0,
+) -> Facets:
+    """Find the patches of a map and their slopes about the mean plane.
+
+    Parameters
+    ----------
+    criterion : float
+        Slope within a patch over the diffraction of the patch. [1]
+    resolution : float
+        Standard deviation of the instrument's point spread; slopes are smoothed by what a
+        patch is larger only. [um]
+
+    Raises
+    ------
+    ValueError
+        If the map has fewer than 100 cells of known heights.
     """
-    heights = surface.heights
-    known = np.isfinite(heights)
-    widths = [smoothing / step for step in surface.spacing]
-    if smoothing > 0:
-        mode = "wrap" if surface.periodic else "nearest"
-        weight = ndimage.gaussian_filter(known.astype(float), widths, mode=mode)
-        level = float(heights[known].mean())
-        filled = np.where(known, heights - level, 0.0)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            smooth = ndimage.gaussian_filter(filled, widths, mode=mode) / weight
-        heights = np.where(known & (weight > 0.98), smooth, np.nan)
-    if not surface.periodic:
-        # The smoothed rim is drawn towards itself
-        rim = [
-            min(int(np.ceil(2 * w)), (n - 2) // 3)
-            for w, n in zip(widths, heights.shape, strict=True)
-        ]
-        heights = heights[
-            tuple(slice(r, n - r) for r, n in zip(rim, heights.shape, strict=True))
-        ]
-    x, y = _cell_slopes(heights, surface)
-    both = np.isfinite(x) & np.isfinite(y)
-    if both.sum() < 100:
+    slopes, known = _known_slopes(surface)
+    extent = min(n * d for n, d in zip(surface.shape, surface.spacing, strict=True))
+    smallest, largest = 0.05 * wavelength, min(_LARGEST * wavelength, extent / 12)
+    steps = max(int(np.log(largest / smallest) / np.log(_RATIO)), 0)
+    sizes = smallest * _RATIO ** np.arange(steps + 1)
+    left = known.copy()
+    aspect = _aspect(slopes, known, surface)
+    found: list[Array] = []
+    counts = np.zeros(sizes.size, dtype=int)
+    for i, size in enumerate(sizes):
+        mean = _Mean(surface, known, (size * aspect**-0.5, size * aspect**0.5))
+        smooth = [mean(s) for s in slopes]
+        hidden = [mean(s**2) - m**2 for s, m in zip(slopes, smooth, strict=True)]
+        within = np.sqrt(np.maximum(hidden[0] / aspect + hidden[1] * aspect, 0.0) / 2)
+        take = left & (within >= criterion * wavelength / (8 * np.pi * size))
+        last = i == steps or (left.sum() - take.sum()) < _REST * known.sum()
+        take = left if last else take
+        if resolution > 0:
+            whole = size**2 * np.array([1 / aspect, aspect])
+            rest = np.sqrt(np.maximum(whole - resolution**2, 0.0))
+            smooth = [_Mean(surface, known, rest)(s) for s in slopes]
+        found.append(np.stack([m[take] for m in smooth]))
+        counts[i] = take.sum()
+        left = left & ~take
+        if last:
+            break
+    x, y = np.concatenate(found, axis=1)
+    filled = counts > 0
+    return Facets(
+        slope_x=x - x.mean(), slope_y=y - y.mean(), sizes=sizes[filled],
+        counts=counts[filled], wavelength=wavelength, aspect=aspect,
+    )  # fmt: skip
+
+
+def _known_slopes(surface: HeightMap) -> tuple[list[Array], Array]:
+    """Slopes of the cells about their mean, 0 where missing, and which are known."""
+    slopes = _cell_slopes(surface.heights, surface)
+    known = np.isfinite(slopes[0]) & np.isfinite(slopes[1])
+    if known.sum() < 100:
         msg = (
-            f"surface must have 100 cells of known heights at least, got {both.sum()}. "
+            f"surface must have 100 cells of known heights at least, got {known.sum()}. "
             "Give a larger map."
         )
         raise ValueError(msg)
-    x, y = x[both], y[both]
-    return x - x.mean(), y - y.mean()
+    return [np.where(known, s - s[known].mean(), 0.0) for s in slopes], known
 
 
-def hidden_slope(surface: HeightMap, patch: float) -> float:
-    """Rms slope along an axis within a patch, about that of the patch; median over the map.
+def _aspect(slopes: list[Array], known: Array, surface: HeightMap) -> float:
+    """Length of patches along y over x that hide on each axis what they diffract there."""
+    bends = []
+    for axis, (slope, step) in enumerate(zip(slopes, surface.spacing, strict=True)):
+        both = np.diff(known.astype(int), axis=axis) == 0
+        change = np.diff(slope, axis=axis)[both & np.delete(known, 0, axis)]
+        bends.append(np.sqrt(np.mean(change**2)) / step if change.size else 0.0)
+    if min(bends) == 0:
+        return 1.0
+    ratio = float(np.clip(np.sqrt(bends[0] / bends[1]), 0.1, 10.0))
+    return 1.0 if 1 / _ISOTROPIC < ratio < _ISOTROPIC else ratio
 
-    The mean over the map would be that of its few cliffs.
-    """
-    slopes = _cell_slopes(surface.heights, surface)
-    known = np.isfinite(slopes[0]) & np.isfinite(slopes[1])
-    widths = [patch / step for step in surface.spacing]
-    mode = "wrap" if surface.periodic else "nearest"
 
-    def mean(values: Array) -> Array:
-        filled = np.where(known, values, 0.0)
-        return np.asarray(ndimage.gaussian_filter(filled, widths, mode=mode))
+class _Mean:
+    """Gaussian mean over the known cells of a map, of a standard deviation an axis [um]."""
 
-    weight = np.where(known, np.maximum(mean(np.ones(known.shape)), 1e-9), 1.0)
-    within = [mean(s**2) / weight - (mean(s) / weight) ** 2 for s in slopes]
-    median = np.mean([np.median(np.sqrt(np.maximum(w[known], 0.0))) for w in within])
-    return float(median)
+    def __init__(self, surface: HeightMap, known: Array, sizes: Sequence[float]) -> None:
+        pairs = zip(sizes, surface.spacing, strict=True)
+        self.widths = [size / step for size, step in pairs]
+        self.mode = "wrap" if surface.periodic else "nearest"
+        self.weight = None
+        if not known.all():
+            self.weight = np.maximum(self._filtered(known.astype(float)), 1e-9)
+
+    def __call__(self, values: Array) -> Array:
+        """Mean of values that are 0 where missing."""
+        mean = self._filtered(values)
+        return mean if self.weight is None else mean / self.weight
+
+    def _filtered(self, values: Array) -> Array:
+        return np.asarray(ndimage.gaussian_filter(values, self.widths, mode=self.mode))
 
 
 def _cell_slopes(heights: Array, surface: HeightMap) -> tuple[Array, Array]:
@@ -133,90 +225,52 @@ def _cell_slopes(heights: Array, surface: HeightMap) -> tuple[Array, Array]:
     return x, y
 
 
-def find_patch(surface: HeightMap, wavelength: float) -> float:
-    """Size of the patch whose diffraction equals the slopes that it hides. [um]"""
-    from scipy.optimize import brentq
-
-    extent = min(n * d for n, d in zip(surface.shape, surface.spacing, strict=True))
-    low, high = 0.05 * wavelength, min(_LARGEST * wavelength, extent / 12)
-
-    surface = _middle(surface)
-
-    def excess(log_size: float) -> float:
-        size = float(np.exp(log_size))
-        return hidden_slope(surface, size) - diffraction(size, wavelength)
-
-    if high <= low or excess(np.log(high)) < 0:
-        return max(high, low)
-    return float(np.exp(brentq(excess, np.log(low), np.log(high), xtol=0.02)))
-
-
-def _middle(surface: HeightMap) -> HeightMap:
-    """Return the middle of a large map: its median is known well enough."""
-    begin = [max(n - _ENOUGH, 0) // 2 for n in surface.shape]
-    if not any(begin):
-        return surface
-    inside = tuple(slice(b, b + _ENOUGH) for b in begin)
-    return HeightMap(surface.heights[inside], surface.spacing)
-
-
-def diffraction(patch: float, wavelength: float) -> float:
+def diffraction(patch: Array, wavelength: float) -> Array:
     """Blur of the slope of a patch per axis, at normal incidence. [1]"""
     return wavelength / (8 * np.pi * patch)
 
 
-def facets_of(
-    surface: HeightMap, wavelength: float, *, patch: float, resolution: float = 0.0
-) -> Facets:
-    """Slopes of patches of a size on a map that its instrument smoothed already.
-
-    Parameters
-    ----------
-    resolution : float
-        Standard deviation of the instrument's point spread; the map is smoothed by what a
-        patch is larger only. [um]
-    """
-    smoothing = float(np.sqrt(max(patch**2 - resolution**2, 0.0)))
-    slopes = smooth_slopes(surface, smoothing)
-    hidden = hidden_slope(surface, smoothing) if smoothing > 0 else 0.0
-    return Facets(
-        slope_x=slopes[0], slope_y=slopes[1], patch=patch,
-        blur=diffraction(patch, wavelength), hidden=hidden,
-    )  # fmt: skip
-
-
 def slope_table(facets: Facets, *, scale: float = 1.0, nodes: int = _NODES) -> SlopeTable:
-    """Density of the blurred slopes: radial, or elliptical where the axes differ.
+    """Density of the blurred slopes: radial, or over both axes where they differ.
 
     Parameters
     ----------
     scale : float
         Factor on all slopes of patches. [1]
     """
-    slopes = scale * np.stack([facets.slope_x, facets.slope_y])
-    covariance = slopes @ slopes.T / slopes.shape[1]
-    values, axes = np.linalg.eigh(covariance)
-    if values[1] < _ISOTROPIC**2 * values[0]:
-        values = np.full(2, values.mean())
-    widths = np.sqrt(np.maximum(values, 1e-16))
-    # Slopes in units of their rms along the principal axes
-    to_units = axes / widths @ axes.T
-    radius = np.hypot(*(to_units @ slopes))
-    reach = 1.1 * float(np.quantile(radius, _WITHIN)) + _BIN
+    widths, _ = facets.principal
+    reach = 1.1 * float(np.quantile(facets.radius, _WITHIN)) + _BIN
+    limit = scale * widths.max() * reach + 4 * facets.blur
+    grid = np.linspace(-limit, limit, nodes)
+    step = grid[1] - grid[0]
+    density = np.zeros((nodes, nodes))
+    for blur, group in facets.groups():
+        if widths[0] == widths[1]:
+            sharp = _rings(scale * widths[0], facets.radius[group], reach, grid)
+            spread = blur
+        else:
+            x, y = scale * facets.slope_x[group], scale * facets.slope_y[group]
+            sharp = _cells(x, y, grid)
+            spread = np.hypot(blur, _KERNEL * scale * widths.min())
+        density += ndimage.gaussian_filter(
+            sharp, spread / step, mode="constant", truncate=5
+        )
+    return SlopeTable(grid, grid, density)
+
+
+def _rings(width: float, radius: Array, reach: float, grid: Array) -> Array:
+    """Facets per slope area at the nodes, from their |slope| in units of `width`."""
     count, edges = np.histogram(
         np.minimum(radius, reach * 0.999), int(reach / _BIN) + 2, (0, reach)
     )
-    ring = count / (np.pi * np.diff(edges**2)) / radius.size
-    middle = np.concatenate([(edges[1:] + edges[:-1]) / 2, [edges[-1]]])
-    ring = np.append(ring, 0.0)
-    limits = np.sqrt((widths.max() * reach) ** 2 + (4 * facets.blur) ** 2)
-    grid = np.linspace(-limits, limits, nodes)
-    step = grid[1] - grid[0]
-    along, across = np.tensordot(
-        to_units, np.stack(np.meshgrid(grid, grid, indexing="ij")), 1
-    )
-    density = np.interp(np.hypot(along, across), middle, ring, right=0.0)
-    blurred = ndimage.gaussian_filter(
-        density, facets.blur / step, mode="constant", truncate=5
-    )
-    return SlopeTable(grid, grid, blurred)
+    middle = np.append((edges[1:] + edges[:-1]) / 2, edges[-1])
+    ring = np.append(count / np.diff(edges**2), 0.0)
+    return np.interp(np.hypot(grid[:, None], grid) / width, middle, ring, right=0.0)
+
+
+def _cells(slope_x: Array, slope_y: Array, grid: Array) -> Array:
+    """Facets at the nearest nodes; those beyond the grid at its rim."""
+    half = (grid[1] - grid[0]) / 2
+    edges = np.append(grid - half, grid[-1] + half)
+    inside = [np.clip(s, grid[0], grid[-1]) for s in (slope_x, slope_y)]
+    return np.histogram2d(inside[0], inside[1], bins=[edges, edges])[0]

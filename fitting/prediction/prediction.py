@@ -109,14 +109,18 @@ class Prediction:
 
     @cached_property
     def _gaussian(self) -> MicrofacetModel:
-        """Gaussian slopes of the same median, for the second bounce only."""
-        table = self.model.slope_distribution
-        x, y = table.slope_rms  # type: ignore[union-attr]
-        radius = np.hypot(table.slope_x[:, None] / x, table.slope_y / y).ravel()  # type: ignore[union-attr]
-        order = np.argsort(radius)
-        share = np.cumsum(table.density.ravel()[order])  # type: ignore[union-attr]
-        median = radius[order][np.searchsorted(share, share[-1] / 2)]
-        # A Gaussian of unit slopes has its median at 1.18; cliffs pair with nothing nearby
-        scale = float(median / np.sqrt(2 * np.log(2)))
-        slope = scale * x if np.isclose(x, y, rtol=1e-3) else (scale * x, scale * y)
+        """Gaussian slopes of the median of the patches, for the second bounce only.
+
+        Light that went from a patch to another has left the first: neither cliffs, which
+        pair with nothing nearby, nor what lies within a patch send it there.
+        """
+        # A Gaussian of unit slopes has its median at 1.18,
+        scale = np.median(self.facets.radius) / np.sqrt(2 * np.log(2))
+        widths, _ = self.facets.principal
+        slope: float | tuple[float, float] = float(scale * widths[0])
+        if widths[0] != widths[1]:
+            slope = (
+                float(scale * np.std(self.facets.slope_x)),
+                float(scale * np.std(self.facets.slope_y)),
+            )
         return MicrofacetModel(self.model.material, slope_rms=slope)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fitting.prediction.facets import Facets, facets_of, find_patch, slope_table
+from fitting.prediction.facets import Facets, facets_of, slope_table
 from fitting.prediction.prediction import Draw, Prediction
 from fitting.statistics.mended import mended_once
 from pbrdf import HeightMap, Material, MicrofacetModel
@@ -15,9 +15,9 @@ from pbrdf.optics import library
 
 __all__ = ["predict"]
 
-# Standard deviations of the priors. The size of the patch is known to a factor: the
-# criterion is one of order 1
-_PATCH = 0.35
+# Standard deviations of the priors. Of the criterion for a patch, of order 1, in its
+# logarithm: sizes move by about 0.65 of it
+_CRITERION = 0.5
 # Slopes of two maps of one coating at different places differ by 12 and 31 %
 _PLACE = 0.15
 # The best facet model of a real coating is 9 to 17 % off
@@ -46,9 +46,9 @@ def predict(
     """Predict the Mueller BRDF of a surface from its height map; nothing is fitted.
 
     Terraces and other faults of the map are mended first. The slopes are those of patches
-    that diffract as much as they hide (`fitting.prediction.facets`), with no parameter of
-    the coating. Light mirrored once and twice is counted; of the base under the interface,
-    only what the material states.
+    that diffract as much as they hide, each place with its own
+    (`fitting.prediction.facets`), with no parameter of the coating. Light mirrored once and
+    twice is counted; of the base under the interface, only what the material states.
 
     Parameters
     ----------
@@ -115,12 +115,12 @@ def predict(
     if base_albedo is None:
         base_albedo = _BASE if bare and np.isfinite(n) else 0.0
     mended = mended_once(surface)
-    patch = find_patch(mended, wavelength)
-    facets = facets_of(mended, wavelength, patch=patch, resolution=resolution)
+    facets = facets_of(mended, wavelength, resolution=resolution)
+    patch = facets.patch
     notes = [
-        f"patches of {patch:.3g} um (standard deviation) diffract by a slope of "
+        f"patches of {patch:.3g} um (median standard deviation) diffract by a slope of "
         f"{facets.blur:.3g}; slope rms {facets.slope_rms:.3g}",
-        f"the interval holds: patch within a factor {np.exp(_PATCH):.2g}, slope "
+        f"the interval holds: criterion within a factor {np.exp(_CRITERION):.2g}, slope "
         f"{place:.0%} between places, n +- {index_stderr:g}, facet model {_MODEL:.0%}, "
         f"Lambertian base 0 to {base_albedo:g}",
     ]
@@ -134,7 +134,7 @@ def predict(
     # Three sizes of patches carry the prior; slopes are scaled within them
     sizes = [
         facets_of(
-            mended, wavelength, patch=patch * np.exp(_PATCH * z), resolution=resolution
+            mended, wavelength, criterion=np.exp(_CRITERION * z), resolution=resolution
         )
         for z in np.sqrt(1.5) * np.array([-1.0, 0.0, 1.0])
     ]

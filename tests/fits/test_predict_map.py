@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import xarray as xr
+from scipy import ndimage
 
 import fitting
 from fitting.prediction.comparison import misfit
-from fitting.prediction.facets import diffraction, facets_of, find_patch, slope_table
+from fitting.prediction.facets import diffraction, facets_of, slope_table
 from fitting.prediction.scan_density import free_density
 from pbrdf import (
     GaussianSurface,
@@ -26,39 +28,81 @@ def ground(slope: float, *, n: int = 256, spacing: float = 1.0) -> HeightMap:
     return surface.sample(seed=3)
 
 
-@pytest.mark.parametrize("slope", [0.1, 0.3])
-def test_clean_map_has_the_monte_carlo_over_it(slope: float) -> None:
-    surface = ground(slope)
+def over_bins(found: fitting.Prediction, run: xr.Dataset, phi_i: float) -> np.ndarray:
+    """Mueller BRDF averaged over the bins of a simulation by Gauss's rule."""
+    nodes = np.array([-0.774597, 0.0, 0.774597])
+    weights = np.array([5, 8, 5]) / 18
+    half_theta = np.pi / 4 / run.theta_s.size
+    half_phi = np.pi / run.dphi.size
+    theta_i = run.theta_i.values[:, None, None]
+    return sum(
+        w * v * found.brdf(
+            theta_i, run.theta_s.values[:, None] + half_theta * x,
+            run.dphi.values + half_phi * y, phi_i=phi_i,
+        )
+        for w, x in zip(weights, nodes, strict=True)
+        for v, y in zip(weights, nodes, strict=True)
+    )  # fmt: skip
+
+
+def off_by(
+    surface: HeightMap, element: tuple[int, int] = (0, 0), phi_i: float | str = "uniform"
+) -> float:
+    """Rms of prediction less Monte Carlo over the map, beyond the noise of the latter.
+
+    Over the rms M10 for M10, over each M00 for M00.
+    """
     theta_i = np.deg2rad([10.0, 30.0, 50.0])
     run = simulate(
-        Scene(surface, GLASS), theta_i, phi_i="uniform", n_rays=60_000, n_theta=30,
-        n_dphi=36, stokes="unpolarized", seed=4,
+        Scene(surface, GLASS), theta_i, phi_i=phi_i, n_rays=100_000, n_theta=30,
+        n_dphi=36, stokes="linear", seed=4,
     )  # fmt: skip
-    traced = run.brdf_total.values[..., 0, 0]
-    noise = np.sqrt((run.brdf_stderr.values[..., 0, 0] ** 2).sum(0))
-    theta_s, dphi = run.theta_s.values[:, None], run.dphi.values
     found = fitting.predict(surface, GLASS, wavelength=0.65)
-    half = np.deg2rad([-1.0, 0.0, 1.0])
-    # Mean over a bin by Simpson's rule, as the tracer counts
-    weight = np.array([1, 4, 1]) / 6
-    views = [np.clip(theta_s + 1.5 * h, 0, np.pi / 2) for h in half]
-    incidence = theta_i[:, None, None]
-    mean = sum(
-        w * found.brdf(incidence, view, dphi)[..., 0, 0]
-        for w, view in zip(weight, views, strict=True)
+    mean = over_bins(found, run, 0.0 if phi_i == "uniform" else float(phi_i))
+    at = (..., *element)
+    traced = run.brdf_total.values[at]
+    noise = np.sqrt((run.brdf_stderr.values**2).sum(0))
+    whole = run.brdf_total.values[..., 0, 0]
+    seen = whole > 0.05 * whole.max(axis=(1, 2), keepdims=True)
+    seen &= noise[..., 0, 0] < 0.1 * whole
+    size = np.where(seen, whole, 1)
+    if element != (0, 0):
+        size = np.full_like(whole, np.sqrt(np.mean(traced[seen] ** 2)))
+    off, chance = ((mean[at] - traced) / size)[seen], (noise[at] / size)[seen]
+    return float(np.sqrt(np.maximum(np.mean(off**2) - np.mean(chance**2), 0)))
+
+
+@pytest.mark.parametrize("slope", [0.1, 0.3, 0.5])
+@pytest.mark.parametrize("element", [(0, 0), (1, 0)])
+def test_clean_map_has_the_monte_carlo_over_it(
+    slope: float, element: tuple[int, int]
+) -> None:
+    assert off_by(ground(slope), element) < 0.08
+
+
+@pytest.mark.parametrize("phi_i", [0.0, 1.0])
+def test_each_azimuth_of_a_brushed_map_has_its_own_monte_carlo(phi_i: float) -> None:
+    brushed = GaussianSurface(
+        shape=(384, 384), spacing=0.6, corr_length=(6.0, 18.0), height_rms=1.2
+    ).sample(seed=3)
+    assert off_by(brushed, phi_i=phi_i) < 0.08
+
+
+def test_small_patches_where_rugged_and_large_where_smooth() -> None:
+    x = np.arange(400)
+    rugged = np.where(x < 200, 0.02, 0.4)[:, None] * np.random.default_rng(1).normal(
+        size=(400, 200)
     )
-    seen = (traced > 0.1 * traced.max(axis=(1, 2), keepdims=True)) & (noise < 0.1 * traced)
-    off = (mean / np.where(seen, traced, 1) - 1)[seen]
-    spread = np.sqrt(np.mean(off**2) - np.mean((noise[seen] / traced[seen]) ** 2))
-    assert abs(off.mean()) < 0.05
-    assert spread < 0.08
+    smooth = ndimage.gaussian_filter(rugged, 3.0)
+    facets = facets_of(HeightMap(smooth, 0.3), 0.65)
+    blur = np.concatenate([np.full(g.stop - g.start, b[0]) for b, g in facets.groups()])
+    sharp, broad = np.quantile(blur, [0.1, 0.9])
+    assert broad > 3 * sharp
 
 
 def test_blur_vanishes_with_the_wavelength() -> None:
     surface = ground(0.2)
-    blurs = [
-        facets_of(surface, w, patch=find_patch(surface, w)).blur for w in (0.2, 0.8, 3.2)
-    ]
+    blurs = [facets_of(surface, w).blur for w in (0.2, 0.8, 3.2)]
     assert blurs[0] < 0.025
     # Within a small patch slopes grow as its size: the blur goes as the root
     assert np.allclose(np.divide(blurs[1:], blurs[:-1]), 2.0, rtol=0.15)
@@ -73,7 +117,7 @@ def test_diffraction_of_a_patch_by_transform() -> None:
     q_z = 4 * np.pi / wavelength
     power = np.abs(np.exp(1j * q_z * np.outer(slope, x)) @ field) ** 2
     rms = np.sqrt(np.sum(power * slope**2) / np.sum(power))
-    assert rms == pytest.approx(diffraction(patch, wavelength), rel=1e-3)
+    assert rms == pytest.approx(diffraction(np.array(patch), wavelength), rel=1e-3)
 
 
 def test_table_keeps_the_slopes_of_each_axis() -> None:
@@ -84,9 +128,10 @@ def test_table_keeps_the_slopes_of_each_axis() -> None:
         k, m = rng.integers(1, 5), rng.integers(4, 16)
         heights += np.cos(2 * np.pi * (k * i + m * j) / 192 + rng.uniform(0, 7)) / m
     surface = HeightMap(0.3 * heights, 0.9, periodic=True)
-    facets = facets_of(surface, 0.5, patch=0.5)
+    facets = facets_of(surface, 0.5)
     rms = slope_table(facets).slope_rms
-    expected = [np.hypot(s.std(), facets.blur) for s in (facets.slope_x, facets.slope_y)]
+    blurs = np.sqrt(np.average(facets.blurs**2, axis=0, weights=facets.counts))
+    expected = np.hypot([facets.slope_x.std(), facets.slope_y.std()], blurs)
     assert rms[1] > 1.3 * rms[0]
     np.testing.assert_allclose(rms, expected, rtol=0.04)
 
