@@ -13,9 +13,11 @@ from pbrdf.conventions import direction
 from pbrdf.errors import AccuracyWarning, check_seed, require
 from pbrdf.optics.materials import Material
 from pbrdf.scene.scene import Scene
+from pbrdf.simulation.memory import CURE, asked_size, at_work
 from pbrdf.simulation.run import simulate
 from pbrdf.surface import Surface
 from pbrdf.tracer.arguments import isotropic
+from pbrdf.tracer.memory import check_room
 
 DRY = "dry"
 # Directions this near to the specular one are its lobe, up to the second angle its skirt;
@@ -88,6 +90,7 @@ def compare_dew(  # noqa: PLR0913  (a scene, an amount and a run)
         Scene(surface, substrate, Drops(contact_angle=angle, material=water, **amount))
         for angle in angles
     ]
+    _check_memory(scenes[-1], theta_i, len(scenes), runs, options)
     states = [DRY] + [f"{np.rad2deg(angle):.4g} deg" for angle in angles]
     results, notes = [], dict[str, None]()
     for number, scene in enumerate(scenes):
@@ -124,6 +127,34 @@ def compare_dew(  # noqa: PLR0913  (a scene, an amount and a run)
     whole.attrs["isotropic"] = isotropic(surface)
     whole.attrs |= {"warnings": list(notes), "runs": runs, "seed": seed}
     return whole.drop_vars(["brdf_runs", "one_path"])
+
+
+def _check_memory(
+    scene: Scene,
+    theta_i: npt.ArrayLike,
+    states: int,
+    runs: int,
+    options: Mapping[str, Any],
+) -> None:
+    """Refuse a comparison that does not fit into the memory that is free."""
+    given: dict[str, Any] = {
+        "wavelength": None, "n_theta": 45, "n_dphi": 90, "stokes": "full", **options
+    }  # fmt: skip
+    size = asked_size(
+        theta_i, "uniform", given["wavelength"], given["n_theta"], given["n_dphi"],
+        given["stokes"],
+    )  # fmt: skip
+    work = at_work(
+        scene, size, n_rays=given.get("n_rays"), realizations=given.get("realizations"),
+        planned="target_rel_error" in given, workers=given.get("workers"),
+        looks=given.get("variance_reduction", True),
+    )  # fmt: skip
+    kept = states * runs * size.unit
+    # All runs of a state whole beside the BRDF of those before; then copies by state, for
+    # the mean and for its error
+    need = max(kept + runs * size.result + work, 3 * kept)
+    words = f"{states} states x {runs} runs x {size.words()}"
+    check_room(need, words, f"{CURE}, or fewer runs=.")
 
 
 def signatures(result: xr.Dataset) -> xr.Dataset:

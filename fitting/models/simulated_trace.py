@@ -22,6 +22,8 @@ import xarray as xr
 from fitting.models.index_grid import IndexGrid
 from pbrdf import HeightMap, Material, MicrofacetModel, Scene, simulate
 from pbrdf.errors import AccuracyWarning
+from pbrdf.simulation.memory import CURE, asked_size, at_work
+from pbrdf.tracer.memory import check_room
 
 __all__ = ["Trace", "group_count", "interpolate_bins", "merged", "trace"]
 
@@ -127,6 +129,14 @@ def trace(  # noqa: PLR0913  (what one may want to choose of a run)
         material = Material.from_table(wavelength=keys, n=nodes.real, kappa=nodes.imag)
     fixed = isinstance(scene.surface, HeightMap)
     each = -(-realizations // groups)
+    lights = np.atleast_1d(theta_i).size
+    size = asked_size([0.0] * lights, 0.0, keys, n_theta, n_dphi, stokes)
+    work = at_work(
+        scene, size, n_rays=n_rays, realizations=each, planned=False, workers=workers,
+        looks=False,
+    )  # fmt: skip
+    cure = f"{CURE}, or a smaller index_range=."
+    check_room(work + groups * size.result, f"{groups} runs x {size.words()}", cure)
     runs = []
     for number, child in enumerate(np.random.SeedSequence(seed).generate_state(groups)):
         with warnings.catch_warnings():

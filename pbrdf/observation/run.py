@@ -18,7 +18,7 @@ from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.paths.shading import LEAKED, N_LEAKED, SIDEWAYS, TRUNCATED
 from pbrdf.observation.look import Look
 from pbrdf.observation.readings import Readings, as_scan, to_dataset
-from pbrdf.observation.samples import look_at_samples
+from pbrdf.observation.samples import check_memory, look_at_samples
 from pbrdf.scene.scene import Scene
 from pbrdf.scene.write import scene_text
 from pbrdf.surface import (
@@ -196,6 +196,7 @@ def observe(  # noqa: PLR0913  (the public signature)
         base=run.base,
         n_stokes=run.n_stokes,
     )
+    check_memory(run, look)
     _check_growth(look.hemisphere_samples, look.sample_decay)
     judged = run.judged(angles[0], run.waves)
     early = [*judged.notes, *_wide_cones(estimator, widest, slope)]

@@ -4,14 +4,49 @@ from functools import partial
 
 import numpy as np
 
+from pbrdf.conventions import BOUNCES
 from pbrdf.observation.look import Look, Sight
 from pbrdf.observation.one_sample import look_at
 from pbrdf.observation.readings import Readings
 from pbrdf.surface import FixedSurface, GaussianSurface, MeasuredSurface, MeshSurface
 from pbrdf.tracer.asked import Run
 from pbrdf.tracer.field import Field
+from pbrdf.tracer.memory import NODE, PROGRAM, Size, check_room
 from pbrdf.tracer.mesh_field import MeshField
-from pbrdf.tracer.schedule import gather
+from pbrdf.tracer.schedule import MOST_SAMPLES, gather
+
+
+def at_work(run: Run, look: Look) -> float:
+    """Return the most that looking at the samples of a run takes at one time. [bytes]"""
+    unit = _size(look).unit
+    samples = run.samples if run.target is None else MOST_SAMPLES
+    sights = min(samples, 2 * run.workers + 1)
+    # Matrices of each sight by bounces, those that come by luck, and their variance; means
+    # and scatters of two kinds and what is foretold, with copies of some while one is added
+    held = (3 * len(BOUNCES) * sights + (5 + 4) * (len(BOUNCES) + 1)) * unit
+    nodes = int(np.prod(getattr(run.scene.surface, "shape", (0,))))
+    return held + NODE * nodes * (1 if run.batched else min(samples, run.workers)) + PROGRAM
+
+
+def check_memory(run: Run, look: Look) -> None:
+    """Refuse a run that does not fit into the memory that is free.
+
+    Raises
+    ------
+    ValueError
+        With what it would take, and what to change.
+    """
+    cure = (
+        "Take fewer geometries (theta_i=, theta_s=) or wavelengths (wavelength=) at a "
+        "time, or stokes='linear' or 'unpolarized'."
+    )
+    check_room(at_work(run, look), _size(look).words(), cure)
+
+
+def _size(look: Look) -> Size:
+    return Size(
+        angles=look.size, azimuths=1, waves=len(look.n), bins=1, n_stokes=look.n_stokes
+    )
 
 
 def look_at_samples(run: Run, look: Look) -> Readings:

@@ -16,6 +16,7 @@ from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.bodies.events import Media
 from pbrdf.kernels.paths.shading import LEAKED, N_LEAKED, N_SIDE, SIDEWAYS, TRUNCATED
 from pbrdf.scene.scene import Scene
+from pbrdf.simulation.memory import asked_size, check_run
 from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.pilot import choose
 from pbrdf.simulation.plan import Plan
@@ -167,6 +168,11 @@ def simulate(  # noqa: PLR0913  (the public signature)
     0.04
     """
     root = arguments.seed_sequence(seed)
+    check_run(
+        scene, asked_size(theta_i, phi_i, wavelength, n_theta, n_dphi, stokes),
+        n_rays=n_rays, realizations=realizations, planned=target_rel_error is not None,
+        workers=workers, looks=variance_reduction,
+    )  # fmt: skip
     geometry: dict[str, Any] = {
         "n_theta": n_theta, "n_dphi": n_dphi, "skips": skips, "fold": fold,
         "source_half_angle": source_half_angle, "max_bounces": max_bounces,

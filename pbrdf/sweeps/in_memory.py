@@ -6,6 +6,7 @@ import xarray as xr
 
 from pbrdf.sweeps.description import Sweep
 from pbrdf.sweeps.layout import STATE, Layout
+from pbrdf.sweeps.memory import check_sweep
 from pbrdf.sweeps.report import Report
 from pbrdf.sweeps.store import Mark
 from pbrdf.sweeps.tasks import compute
@@ -22,6 +23,7 @@ def computed(
 ) -> tuple[xr.Dataset, Report]:
     """Compute a sweep into one dataset; the report tells warnings and failures."""
     layout = Layout.of(sweep)
+    check_sweep(sweep, layout, 0, worker_count(workers))
     held = layout.empty(tuple(layout.sizes.values()))
     report = Report()
     for group in range(layout.n_groups):

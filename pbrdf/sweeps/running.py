@@ -9,6 +9,7 @@ from typing import Any
 from pbrdf.errors import AccuracyWarning
 from pbrdf.files.writing import FULL
 from pbrdf.sweeps.description import Sweep
+from pbrdf.sweeps.memory import check_sweep
 from pbrdf.sweeps.report import RETRIES, Report
 from pbrdf.sweeps.store import Store, complete, open_store
 from pbrdf.sweeps.tasks import OF_MACHINE, finish
@@ -87,7 +88,11 @@ def run_sweep(
     with warnings.catch_warnings():
         # Said once, from the marks
         warnings.simplefilter("ignore", AccuracyWarning)
-        if client is None and (cores == 1 or len(left) <= 1 or part is not None):
+        alone = cores == 1 or len(left) <= 1 or part is not None
+        check_sweep(
+            sweep, store.layout, 1 if alone else min(cores, len(left)), cores, client
+        )
+        if client is None and alone:
             _serial(sweep, store, left, cores, report, told)
         elif left:
             from pbrdf.sweeps.workers import by_client, in_process

@@ -56,12 +56,19 @@ def command(
     from pbrdf.cli.progress import progress_bar
     from pbrdf.cli.staging import staged_file
     from pbrdf.cli.typed import words_typed
+    from pbrdf.simulation.memory import CURE, asked_size
+    from pbrdf.tracer.memory import check_room, stored
 
     loaded = pbrdf.load_scene(scene)
     target_file = options.result_file(output or scene.with_suffix(".nc"))
     if target is None or n_rays is not None or realizations is not None:
         n_rays, realizations = n_rays or 100_000, realizations or 16
     waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
+    size = asked_size(
+        options.incidences(theta_i), options.azimuths(phi_i), waves, n_theta, n_dphi,
+        stokes.value,
+    )  # fmt: skip
+    check_room(stored(size), f"{size.words()}, written to netCDF", f"{CURE}.")
     with staged_file(target_file, force=force) as stage:
         with progress_bar("tracing") as progress:
             result = pbrdf.simulate(

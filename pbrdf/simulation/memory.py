@@ -1,0 +1,157 @@
+"""Memory that `simulate` will take, foretold before it begins."""
+
+import numpy as np
+import numpy.typing as npt
+
+from pbrdf.conventions import BOUNCES
+from pbrdf.kernels.bins.bin_fits import MAX_ORDER, MIN_ORDER
+from pbrdf.kernels.paths.shading import N_RECORD
+from pbrdf.kernels.paths.spectra import N_SUMS
+from pbrdf.kernels.sights.light import N_CELL
+from pbrdf.scene.scene import Scene
+from pbrdf.simulation.single_bounce import LEAST_DPHI, LEAST_THETA
+from pbrdf.simulation.spectra import BUFFER, WORTHWHILE
+from pbrdf.surface import GaussianSurface
+from pbrdf.tracer import arguments
+from pbrdf.tracer.memory import NODE, PROGRAM, Size, check_room
+
+__all__ = ["CURE", "asked_size", "at_work", "check_run"]
+
+CURE = (
+    "Take fewer directions (theta_i=, phi_i=), wavelengths (wavelength=), bins (n_theta=, "
+    "n_dphi=), stokes='linear' or 'unpolarized'"
+)
+# Rays and samples where a plan or a target error will say how many
+_RAYS, _MANY = 100_000, 10**6
+# Numbers of 8 bytes a bin that tell how facets are seen and balance them with the rays
+_LOOKS = 16
+# Buffered rows of a ray, at the most
+_ROWS = 2
+
+
+def asked_size(
+    theta_i: npt.ArrayLike, phi_i: npt.ArrayLike | str, wavelength: npt.ArrayLike | None,
+    n_theta: int, n_dphi: int, stokes: str,
+) -> Size:  # fmt: skip
+    """Return the size of what is asked for; arguments as of `simulate`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If one is out of its range.
+    """
+    waves = arguments.wavelengths(wavelength)
+    n_theta = arguments.count("n_theta", n_theta, 1)
+    return Size(
+        angles=len(arguments.zeniths(theta_i)),
+        azimuths=len(arguments.azimuths(phi_i)[0]),
+        waves=1 if waves is None else waves.size,
+        bins=n_theta * arguments.even_count("n_dphi", n_dphi),
+        n_stokes=arguments.stokes_count(stokes),
+    )
+
+
+def check_run(
+    scene: Scene,
+    size: Size,
+    *,
+    n_rays: int | None,
+    realizations: int | None,
+    planned: bool,
+    workers: int | None,
+    looks: bool,
+) -> None:
+    """Refuse a run that does not fit into the memory that is free.
+
+    Arguments as of `at_work`.
+
+    Raises
+    ------
+    ValueError
+        With what it would take, and what to change.
+    """
+    need = at_work(
+        scene, size, n_rays=n_rays, realizations=realizations, planned=planned,
+        workers=workers, looks=looks,
+    )  # fmt: skip
+    check_room(need, size.words(), f"{CURE}, or fewer workers=.")
+
+
+def at_work(
+    scene: Scene,
+    size: Size,
+    *,
+    n_rays: int | None,
+    realizations: int | None,
+    planned: bool,
+    workers: int | None,
+    looks: bool,
+) -> float:
+    """Return the most that `simulate` takes at one time. [bytes]
+
+    It is an upper end: threads need not hold all tallies that they may at one time.
+
+    Parameters
+    ----------
+    scene : Scene
+    size : Size
+        What is computed.
+    n_rays, realizations, workers : int or None
+        As of `simulate`.
+    planned : bool
+        Whether there is a target error, and samples are as many as it takes.
+    looks : bool
+        Whether single bounces may come from looks at facets.
+    """
+    threads = arguments.worker_count(workers)
+    rays = arguments.count("n_rays", n_rays or _RAYS, 1)
+    drawn = arguments.count("realizations", realizations or (_MANY if planned else 1), 1)
+    batched = not arguments.varies(scene) or drawn == 1
+    samples = max(arguments.BATCHES, drawn) if batched else drawn
+    samples = _MANY if planned else samples
+    clean = not scene.contaminants
+    spectral = clean and size.waves >= WORTHWHILE
+    # Those traced, those that wait for the one before them, and the one that is added
+    tallies = min(samples, 2 * threads + 1)
+    # Means and scatters by bounces, the scatter of all together
+    held = float((2 * len(BOUNCES) + 1) * size.unit)
+    held += tallies * _tally(size, len(scene.materials), rays if spectral else None)
+    # One after another: what was estimated, and strengths of single elements of it
+    finished = size.result + 8 * size.unit / size.n_stokes**2
+    surface = scene.surface
+    drawn_anew = isinstance(surface, GaussianSurface) and not batched
+    if looks and clean and drawn_anew and not spectral:
+        sights = _sights(size)
+        held += sights
+        finished += sights + 6 * size.unit / size.n_stokes**2
+    if size.azimuths > 1:
+        # Azimuths are put together in arrays of their own
+        finished += size.result
+    nodes = int(np.prod(getattr(surface, "shape", (0,))))
+    surfaces = NODE * nodes * (1 if batched else min(samples, threads))
+    return max(held + surfaces, finished) + PROGRAM
+
+
+def _tally(size: Size, materials: int, rays: int | None) -> float:
+    """Memory of the tally of a sample, with `rays` that wait to be shaded. [bytes]"""
+    directions = size.angles * size.azimuths
+    by_bin = directions * size.bins
+    small = len(BOUNCES) * by_bin + 8 * by_bin
+    flux = len(BOUNCES) * size.unit
+    if rays is None:
+        return small + flux
+    sums = 1 if size.n_stokes == 1 else N_SUMS
+    orders = (MIN_ORDER + MAX_ORDER) / 2
+    rows = min(BUFFER, _ROWS * rays)
+    light = 8 * (materials * by_bin * sums * orders + directions * rows * N_RECORD)
+    # A buffer that overflows is shaded into the flux
+    return small + light + (flux if _ROWS * rays > BUFFER else 0)
+
+
+def _sights(size: Size) -> float:
+    """Memory of single bounces that do not come from rays. [bytes]"""
+    per_bin = 8 * size.angles * size.azimuths
+    cells = per_bin * max(size.bins, LEAST_THETA * LEAST_DPHI)
+    light = cells * (N_CELL + size.waves * size.n_stokes**2)
+    balance = (_LOOKS + (len(BOUNCES) + 1) * size.waves) * per_bin * size.bins
+    return float(light + balance)
