@@ -1,5 +1,7 @@
 """Memory that `simulate` will take, foretold before it begins."""
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
@@ -13,14 +15,17 @@ from pbrdf.simulation.single_bounce import LEAST_DPHI, LEAST_THETA
 from pbrdf.simulation.spectra import BUFFER, WORTHWHILE
 from pbrdf.surface import GaussianSurface
 from pbrdf.tracer import arguments
-from pbrdf.tracer.memory import NODE, PROGRAM, Size, check_room
+from pbrdf.tracer.memory import NODE, PROGRAM, SHARE, Size, check_room, free_bytes
 
-__all__ = ["CURE", "asked_size", "at_work", "check_run"]
+__all__ = ["CURE", "OF_SIZE", "asked_size", "at_work", "check_run", "directions_at_once"]
 
 CURE = (
     "Take fewer directions (theta_i=, phi_i=), wavelengths (wavelength=), bins (n_theta=, "
     "n_dphi=), stokes='linear' or 'unpolarized'"
 )
+_PARTS = "simulate some directions at a time (pbrdf.simulation.simulate_parts)"
+# Arguments of `simulate` that say how large its result is, besides theta_i
+OF_SIZE = ("phi_i", "wavelength", "n_theta", "n_dphi", "stokes")
 # Rays and samples where a plan or a target error will say how many
 _RAYS, _MANY = 100_000, 10**6
 # Numbers of 8 bytes a bin that tell how facets are seen and balance them with the rays
@@ -74,7 +79,11 @@ def check_run(
         scene, size, n_rays=n_rays, realizations=realizations, planned=planned,
         workers=workers, looks=looks,
     )  # fmt: skip
-    check_room(need, size.words(), f"{CURE}, or fewer workers=.")
+    check_room(
+        need,
+        size.words(),
+        f"{CURE}, fewer workers=, or {_PARTS}.",
+    )
 
 
 def at_work(
@@ -130,6 +139,36 @@ def at_work(
     nodes = int(np.prod(getattr(surface, "shape", (0,))))
     surfaces = NODE * nodes * (1 if batched else min(samples, threads))
     return max(held + surfaces, finished) + PROGRAM
+
+
+def directions_at_once(
+    scene: Scene,
+    size: Size,
+    *,
+    n_rays: int | None,
+    realizations: int | None,
+    workers: int | None,
+    looks: bool,
+) -> int:
+    """Return how many directions of the source fit into the memory that is free.
+
+    Raises
+    ------
+    ValueError
+        If not even one does.
+    """
+
+    def need(angles: int) -> float:
+        return at_work(
+            scene, replace(size, angles=angles), n_rays=n_rays, realizations=realizations,
+            planned=False, workers=workers, looks=looks,
+        ) + _sights(size)  # fmt: skip
+
+    one, two = need(1), need(2)
+    check_room(one, replace(size, angles=1).words(), f"{CURE}, or fewer workers=.")
+    # Beside a part the one that is being written
+    room = 0.5 * SHARE * free_bytes()
+    return max(1, min(size.angles, int(1 + (room - one) / (two - one))))
 
 
 def _tally(size: Size, materials: int, rays: int | None) -> float:

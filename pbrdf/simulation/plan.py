@@ -42,6 +42,10 @@ class Plan:
         Half-angle of the source. [rad]
     fold : bool
         Whether each sample is averaged with its mirror image in the plane of incidence.
+    first : int
+        Place of the first direction among all.
+    among : int or None
+        How many directions there are in all, if these are a part of them.
     """
 
     theta_i: np.ndarray
@@ -58,6 +62,18 @@ class Plan:
     media: Media | None = None
     half_angle: float = 0.0
     fold: bool = False
+    first: int = 0
+    among: int | None = None
+
+    @property
+    def n_streams(self) -> int:
+        """How many directions draw numbers, those of other parts included."""
+        return len(self.theta_i) if self.among is None else self.among
+
+    @property
+    def own(self) -> slice:
+        """Which of them are of this part."""
+        return slice(self.first, self.first + len(self.theta_i))
 
     @property
     def optics(self) -> shading.Optics:
@@ -85,6 +101,15 @@ class Plan:
         """Return the plan of another azimuth; both share what does not depend on it."""
         other = replace(self, phi_i=phi_i)
         other.__dict__["spectrum"] = self.spectrum
+        return other
+
+    def part(self, first: int, last: int) -> "Plan":
+        """Return the plan of some directions, which keep the rays they have among all."""
+        other = replace(
+            self, theta_i=self.theta_i[first:last], first=first, among=len(self.theta_i)
+        )
+        shared = self.spectrum
+        other.__dict__["spectrum"] = shared and shared.part(first, last)
         return other
 
     @property

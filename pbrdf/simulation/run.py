@@ -1,7 +1,9 @@
 """Monte Carlo prediction of the Mueller BRDF of a scene: section 3 of the paper."""
 
+import copy
 import warnings
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -16,7 +18,7 @@ from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.bodies.events import Media
 from pbrdf.kernels.paths.shading import LEAKED, N_LEAKED, N_SIDE, SIDEWAYS, TRUNCATED
 from pbrdf.scene.scene import Scene
-from pbrdf.simulation.memory import asked_size, check_run
+from pbrdf.simulation.memory import OF_SIZE, asked_size, check_run
 from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.pilot import choose
 from pbrdf.simulation.plan import Plan
@@ -43,6 +45,10 @@ from pbrdf.validity import (
 MOST_BOUNCES, MOST_EVENTS = 64, 1024
 # Rays an incident direction and realisation, where nobody says how many
 N_RAYS = 100_000
+# Arguments of `simulate` that a pilot has too
+_GEOMETRY = (
+    "n_theta", "n_dphi", "skips", "fold", "source_half_angle", "max_bounces",
+)  # fmt: skip
 
 
 def simulate(  # noqa: PLR0913  (the public signature)
@@ -167,35 +173,68 @@ def simulate(  # noqa: PLR0913  (the public signature)
     >>> round(float(result.albedo.sel(bounces="1").item()), 6)
     0.04
     """
-    root = arguments.seed_sequence(seed)
-    check_run(
-        scene, asked_size(theta_i, phi_i, wavelength, n_theta, n_dphi, stokes),
-        n_rays=n_rays, realizations=realizations, planned=target_rel_error is not None,
-        workers=workers, looks=variance_reduction,
-    )  # fmt: skip
-    geometry: dict[str, Any] = {
-        "n_theta": n_theta, "n_dphi": n_dphi, "skips": skips, "fold": fold,
-        "source_half_angle": source_half_angle, "max_bounces": max_bounces,
-    }  # fmt: skip
+    return traced(prepared(**locals()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ready:
+    """A run that is checked and planned, as its arguments say.
+
+    `chosen` says how a plan was chosen; `given` holds the arguments of `simulate`.
+    """
+
+    run: Run
+    plans: list[Plan]
+    several: bool
+    single: list[SingleBounce] | None
+    chosen: list[str]
+    given: dict[str, Any]
+
+    def part(self, first: int, last: int) -> "Ready":
+        """Return the run of some of the directions, with the rays they have among all."""
+        single = self.single and [one.part(first, last) for one in self.single]
+        # Streams are spawned anew, from the same root
+        run = replace(self.run, root=copy.deepcopy(self.run.root))
+        plans = [plan.part(first, last) for plan in self.plans]
+        return replace(self, run=run, plans=plans, single=single)
+
+
+def prepared(*, whole: bool = True, **given: Any) -> Ready:
+    """Check and plan a run, by the arguments of `simulate`; `whole` if all is kept."""
+    scene, theta_i, wave = given["scene"], given["theta_i"], given["wave"]
+    n_rays, realizations = given["n_rays"], given["realizations"]
+    target, light = given["target_rel_error"], given["variance_reduction"]
+    root = arguments.seed_sequence(given["seed"])
+    size = asked_size(theta_i, **{name: given[name] for name in OF_SIZE})
+    if whole:
+        check_run(
+            scene, size, n_rays=n_rays, realizations=realizations,
+            planned=target is not None, workers=given["workers"], looks=light,
+        )  # fmt: skip
+    geometry = {name: given[name] for name in _GEOMETRY}
+    common = {name: given[name] for name in ("wavelength", "workers")}
     pilot = partial(
-        simulate, scene, theta_i, phi_i=phi_i, wavelength=wavelength,
-        stokes="unpolarized", workers=workers, variance_reduction=variance_reduction,
-        **geometry,
+        simulate, scene, theta_i, phi_i=given["phi_i"], stokes="unpolarized",
+        variance_reduction=light, **common, **geometry,
     )  # fmt: skip
-    rays, drawn, chosen = _counts(
-        n_rays, realizations, target_rel_error, scene, root, pilot
-    )
+    rays, drawn, chosen = _counts(n_rays, realizations, target, scene, root, pilot)
     run = Run.asked(
-        scene, root=root, n_rays=rays, realizations=drawn, wavelength=wavelength,
-        stokes=stokes, target_rel_error=target_rel_error, workers=workers,
-        progress=progress,
+        scene, root=root, n_rays=rays, realizations=drawn, stokes=given["stokes"],
+        target_rel_error=target, progress=given["progress"], **common,
     )  # fmt: skip
-    plans, several = _plans(run, theta_i, phi_i, **geometry)
-    plan = plans[0]
-    wanted = variance_reduction and not run.batched and wave is None
-    single = without_rays(scene, plans, wanted=wanted)
+    plans, several = _plans(run, theta_i, given["phi_i"], **geometry)
+    single = without_rays(scene, plans, wanted=light and not run.batched and wave is None)
     if wave is not None:
-        check_waves(scene, wave, run.waves, stokes, plan.half_angle)
+        check_waves(scene, wave, run.waves, given["stokes"], plans[0].half_angle)
+    return Ready(
+        run=run, plans=plans, several=several, single=single, chosen=chosen, given=given
+    )
+
+
+def traced(ready: Ready) -> xr.Dataset:
+    """Trace the samples of a run, and label what they gave."""
+    run, plans, single, given = ready.run, ready.plans, ready.single, ready.given
+    scene, wave, plan = run.scene, given["wave"], plans[0]
     # What rays do not see at these wavelengths is no fault where waves do the first bounce
     judged = run.judged(plan.theta_i, None if wave else run.waves)
     early = [*judged.notes, *opaque_drop_notes(scene.contaminants, run.waves)]
@@ -208,11 +247,12 @@ def simulate(  # noqa: PLR0913  (the public signature)
     _warn(late)
     # Told in any case, but no surprise to one who set the limit
     cut = _cut_light(moments)
-    _warn(() if max_bounces is not None else cut)
+    _warn(() if given["max_bounces"] is not None else cut)
+    phi_i = given["phi_i"]
     result = to_dataset(
         moments,
         scene,
-        several=several,
+        several=ready.several,
         wavelength=run.waves,
         attrs=run.attributes(done)
         | {
@@ -221,9 +261,9 @@ def simulate(  # noqa: PLR0913  (the public signature)
             "source_half_angle": plan.half_angle,
             "folded": plan.fold,
             "intersector": _intersector(scene, plan.skips),
-            "plan": chosen,
+            "plan": ready.chosen,
             "variance_reduction": "none" if single is None else "single bounces",
-            "explanation": _explain(scene, plan, single) if explain else [],
+            "explanation": _explain(scene, plan, single) if given["explain"] else [],
             "contaminants": [str(dict(report)) for report in moments[0].reports],
             "warnings": [*early, *late, *judged.remarks, *cut],
         },
@@ -235,7 +275,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
 def _warn(notes: Iterable[str]) -> None:
     """Warn whoever called `simulate`."""
     for note in notes:
-        warnings.warn(note, AccuracyWarning, stacklevel=3)
+        warnings.warn(note, AccuracyWarning, stacklevel=4)
 
 
 def _plans(  # noqa: PLR0913  (arguments of `simulate`)

@@ -8,7 +8,7 @@ of further bounces go through, by facets of fitting slopes put at random places.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -100,6 +100,8 @@ class SingleBounce:
     parts : (int, int)
         Cells of a bin along theta_s and dphi.
     directions : tuple of Direction
+    among : SingleBounce, optional
+        Those of all directions, if these are a part of them.
     """
 
     ensemble: Ensemble
@@ -107,6 +109,11 @@ class SingleBounce:
     along_y: np.ndarray
     parts: tuple[int, int]
     directions: tuple[Direction, ...]
+    among: "SingleBounce | None" = None
+
+    def part(self, first: int, last: int) -> "SingleBounce":
+        """Return those of some directions."""
+        return replace(self, directions=self.directions[first:last], among=self)
 
     @classmethod
     def of(cls, surface: GaussianSurface, plan: Plan) -> "SingleBounce":
@@ -128,7 +135,8 @@ class SingleBounce:
     @property
     def everything(self) -> bool:
         """Whether no facet hides another, so that no light is left for further bounces."""
-        seen = [one.cells[..., SEEN].sum() for one in self.directions]
+        directions = (self if self.among is None else self.among).directions
+        seen = [one.cells[..., SEEN].sum() for one in directions]
         return bool(np.abs(1.0 - np.array(seen)).max() < 10 * NOTHING)
 
     def hidden(self) -> np.ndarray:
@@ -181,8 +189,8 @@ class SingleBounce:
         `terrain` is that of the realisation, None where nothing hides anything.
         """
         streams = np.random.default_rng(seed).integers(
-            2**63, size=len(self.directions), dtype=np.uint64
-        )
+            2**63, size=plan.n_streams, dtype=np.uint64
+        )[plan.own]
         for a, one in enumerate(self.directions):
             if terrain is None:
                 tally.counts[a, [N_ESCAPED, N_ORDERS]] = plan.n_rays

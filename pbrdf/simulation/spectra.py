@@ -1,6 +1,6 @@
 """Room for the light of many wavelengths: `pbrdf.kernels.paths.spectra` from Python."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,6 +86,10 @@ class Spectrum:
             # Never of no size, which would mean that nothing is gathered
             sizes.append(max(int(ends[-1, -1]), 1))
         return cls(table=table, bins=tuple(bins), sizes=tuple(sizes))
+
+    def part(self, first: int, last: int) -> "Spectrum":
+        """Return what some of the directions share."""
+        return replace(self, bins=self.bins[first:last], sizes=self.sizes[first:last])
 
     def room(self, index: int, max_bounces: int) -> kernel.Spectra:
         """Empty sums and buffer for incident direction `index` of samples."""

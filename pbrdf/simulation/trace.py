@@ -68,11 +68,13 @@ def trace_sample(
     record = np.empty((plan.max_bounces + 1, 1, shading.N_RECORD))
     waiting = np.empty((plan.max_bounces, N_WAITING))
     rng = np.random.default_rng(seed)
-    shifts = rng.random((len(plan.theta_i), 3))
-    streams = rng.integers(2**63, size=len(plan.theta_i), dtype=np.uint64)
+    number, own = plan.n_streams, plan.own
+    shifts = rng.random((number, 3))
+    streams = rng.integers(2**63, size=number, dtype=np.uint64)[own]
     if plan.half_angle > 0.0:
         # Drawn last, so that a narrow beam keeps its rays
-        shifts = np.hstack([shifts, rng.random((len(plan.theta_i), 2))])
+        shifts = np.hstack([shifts, rng.random((number, 2))])
+    shifts = shifts[own]
     for index, theta in enumerate(plan.theta_i):
         field = target if isinstance(target, Field | MeshField) else target.field
         launch = field.entry_rectangle(theta, plan.phi_i, plan.half_angle)
