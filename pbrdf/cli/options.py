@@ -232,7 +232,10 @@ Incidences = Annotated[
 Azimuths = Annotated[
     str,
     typer.Option(
-        "--phi-i-deg", help="Azimuths of the source by commas, or uniform for the average."
+        "--phi-i-deg",
+        help="Azimuths of the source by commas, or uniform for the average. One azimuth "
+        "shows the surface as it lies; observe and sweep average if not told otherwise, as "
+        "most scans of an unaligned sample do.",
     ),
 ]
 Azimuth = Annotated[
