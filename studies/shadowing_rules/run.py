@@ -8,22 +8,12 @@ import numpy as np
 
 from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene, simulate
 from pbrdf.analytic import SHADOWING
+from studies.bins import bin_averages
 
 FOLDER = Path(__file__).parent
 ANGLES_DEG = (10.0, 41.4, 60.0, 75.0)
 SLOPES = (0.15, 0.30, 0.47)
 N_THETA, N_DPHI = 18, 36
-
-
-def bin_averages(model, theta_i):
-    """Mean of the model's M00 over each bin, weighted with cos(theta) dOmega."""
-    node, weight = np.polynomial.legendre.leggauss(6)
-    step_t, step_p = np.pi / 2 / N_THETA, 2 * np.pi / N_DPHI
-    theta = (np.arange(N_THETA)[:, None] + 0.5 + 0.5 * node) * step_t
-    dphi = (np.arange(N_DPHI)[:, None] + 0.5 * node) * step_p
-    value = model.brdf(theta_i, theta[:, None, :, None], dphi[None, :, None, :])[..., 0, 0]
-    measure = (np.sin(theta) * np.cos(theta) * weight)[:, None, :, None] * weight
-    return (value * measure).sum((2, 3)) / measure.sum((2, 3))
 
 
 def compare(dataset, slope):
@@ -38,7 +28,7 @@ def compare(dataset, slope):
         near_source = np.abs(np.angle(np.exp(1j * dataset.dphi.values))) < np.deg2rad(45)
         for rule in SHADOWING:
             model = MicrofacetModel(Material.mirror(), slope, shadowing=rule)
-            off = bin_averages(model, theta_i) - seen
+            off = bin_averages(model, theta_i, N_THETA, N_DPHI)[..., 0, 0] - seen
             flux = solid * seen
             # Bins known to 5 %, weighted with their light; sampling noise is taken off
             known = seen > 20 * error

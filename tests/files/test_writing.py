@@ -128,6 +128,11 @@ def test_what_a_running_process_writes_is_left_alone(tmp_path):
     assert names(tmp_path) == ["a.nc", "b.nc"]
 
 
+def _listen():
+    """Let interrupts through: shells start background jobs with them ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kill", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
 def test_a_killed_run_leaves_nothing_after_the_next(folder, kill):
@@ -135,11 +140,11 @@ def test_a_killed_run_leaves_nothing_after_the_next(folder, kill):
     for wait in (1.0, 2.5, 4.0):
         run = subprocess.Popen(
             [*RUN, "--n-rays", "400000", "--realizations", "400"], cwd=folder,
-            stderr=subprocess.PIPE,
+            stderr=subprocess.PIPE, preexec_fn=_listen,
         )  # fmt: skip
         time.sleep(wait)
         run.send_signal(kill)
-        run.communicate()
+        run.communicate(timeout=300)
         # Before Python has set itself up a signal ends it the plain way
         assert run.returncode in (expected[kill], -kill)
         assert not (folder / "scene.nc").exists()
