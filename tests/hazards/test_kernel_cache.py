@@ -31,7 +31,37 @@ def answer(x):
     return factor() * x
 """
 
-ASK = "from pbrdf.kernels.caller import answer; print(answer(2.0))"
+ASK = """
+from pbrdf.kernels.caller import answer
+print(answer(2.0), sum(answer.stats.cache_misses.values()))
+"""
+
+
+def make_tree(root: Path, value: float) -> None:
+    """Write a package of two kernels and what keeps them."""
+    kernels = root / "pbrdf/kernels"
+    (kernels / "drawer").mkdir(parents=True, exist_ok=True)
+    (root / "pbrdf/__init__.py").touch()
+    (kernels / "drawer/__init__.py").touch()
+    for name in ("__init__.py", "caching.py"):
+        shutil.copyfile(ROOT / "pbrdf/kernels" / name, kernels / name)
+    (kernels / "caller.py").write_text(CALLER)
+    (kernels / "drawer/callee.py").write_text(CALLEE.format(value=value))
+
+
+def asked(root: Path, cache: Path) -> tuple[float, int, str]:
+    """Return answer, kernels compiled for it, and what was said."""
+    environment = os.environ | {"PBRDF_CACHE_DIR": str(cache), "PYTHONPATH": str(root)}
+    run = subprocess.run(
+        [sys.executable, "-c", ASK],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=environment,
+        cwd=root,
+    )
+    value, compiled = run.stdout.split()
+    return float(value), int(compiled), run.stderr
 
 
 def test_the_hash_covers_every_kernel_source() -> None:
@@ -48,31 +78,26 @@ def test_the_hash_covers_every_kernel_source() -> None:
 def test_an_edited_callee_in_a_sub_folder_gives_the_new_answer(
     tmp_path: Path, cache: str
 ) -> None:
-    """With the old, flat hash and with Numba's own fall-back the second answer was 6.0."""
-    kernels = tmp_path / "pbrdf/kernels"
-    (kernels / "drawer").mkdir(parents=True)
-    (tmp_path / "pbrdf/__init__.py").touch()
-    (kernels / "drawer/__init__.py").touch()
-    shutil.copy(ROOT / "pbrdf/kernels/__init__.py", kernels)
-    (kernels / "caller.py").write_text(CALLER)
+    """With a flat hash or Numba's own fall-back the second answer was 6.0."""
     blocked = tmp_path / "file"
     blocked.touch()
     folder = tmp_path / "cache" if cache == "kept" else blocked / "below-a-file"
-    environment = os.environ | {"PBRDF_CACHE_DIR": str(folder), "PYTHONPATH": str(tmp_path)}
     answers = []
     for value in (3.0, 5.0):
-        (kernels / "drawer/callee.py").write_text(CALLEE.format(value=value))
-        run = subprocess.run(
-            [sys.executable, "-c", ASK],
-            capture_output=True,
-            text=True,
-            check=True,
-            env=environment,
-            cwd=tmp_path,
-        )
-        answers.append(float(run.stdout))
-        assert ("PBRDF_CACHE_DIR" in run.stderr) == (cache == "refused")
+        make_tree(tmp_path, value)
+        answer, _, said = asked(tmp_path, folder)
+        answers.append(answer)
+        assert ("PBRDF_CACHE_DIR" in said) == (cache == "refused")
     assert answers == [6.0, 10.0]
+
+
+def test_checkouts_of_the_same_sources_share_what_one_compiled(tmp_path: Path) -> None:
+    found = []
+    for name, value in (("one", 3.0), ("two", 3.0), ("edited", 5.0), ("one", 3.0)):
+        # Written anew, so that times of files differ
+        make_tree(tmp_path / name, value)
+        found.append(asked(tmp_path / name, tmp_path / "cache")[:2])
+    assert found == [(6.0, 1), (6.0, 0), (10.0, 1), (6.0, 0)]
 
 
 COUNTED = """
