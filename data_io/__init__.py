@@ -20,6 +20,7 @@ from data_io.micrograph.read import (
 )
 from data_io.reflectance.mitsuba import export_mitsuba
 from data_io.reflectance.model import read_model, write_model
+from data_io.reflectance.result_store import is_result_store
 from data_io.reflectance.results import read_result, write_result
 from data_io.text.files import NotAMapError
 from data_io.text.units import MissingUnitWarning
@@ -57,6 +58,7 @@ __all__ = [
     "find_bands",
     "holds_profile",
     "in_plane",
+    "is_result_store",
     "mend_map",
     "mend_profile",
     "read_goniometer",

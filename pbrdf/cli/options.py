@@ -325,9 +325,10 @@ def result_file(target: Path) -> Path:
     ValueError
         If its ending is that of another format than the one that is written.
     """
-    if target.suffix != ".nc":
+    if target.suffix not in (".nc", ".zarr"):
         msg = (
-            f"--output must end in .nc (netCDF), got {target.name!r}. No other is written."
+            "--output must end in .nc (netCDF) or .zarr (a store), got "
+            f"{target.name!r}. No other is written."
         )
         raise ValueError(msg)
     return target

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pbrdf.files import complete_file, complete_folder
 
-__all__ = ["staged_file", "staged_folder"]
+__all__ = ["staged_file", "staged_folder", "staged_store"]
 
 # What tells a result folder of this program from any other folder
 MARK = "model.toml"
@@ -44,6 +44,28 @@ def staged_file(target: Path, *, force: bool = False) -> Iterator[Path]:
         If `target` is a folder, or exists and `force` is not given.
     """
     with complete_file(target, replace=force) as stage:
+        yield stage
+
+
+@contextmanager
+def staged_store(target: Path, *, force: bool = False) -> Iterator[Path]:
+    """Yield a new empty folder that becomes the store `target` when the block succeeds.
+
+    Raises
+    ------
+    ValueError
+        If `target` exists and `force` is not given, or it is no store of a result.
+    """
+    from data_io import is_result_store
+
+    strange = target.is_dir() and any(target.iterdir()) and not is_result_store(target)
+    if strange or (target.exists() and not target.is_dir()):
+        msg = (
+            f"output must be a new store or that of a result, got {target}, which is "
+            "neither. Name another."
+        )
+        raise ValueError(msg)
+    with complete_folder(target, replace=force) as stage:
         yield stage
 
 

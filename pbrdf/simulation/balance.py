@@ -1,5 +1,7 @@
 """Further bounces brought into balance with single bounces that do not come from rays."""
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from pbrdf.kernels.paths.shading import ABSORBED, LEAKED, N_ORDERS, TRUNCATED
@@ -23,6 +25,8 @@ class Balance:
         # Classes of bounces of which no ray need tell: where nothing is hidden, of all
         self.known = shape[2] if single.everything else 1
         self._hidden, self._looks = single.hidden(), single.looks()
+        whole = single.among
+        self._one_of_many = whole is not None and len(whole.directions) > shape[0] == 1
         # By sample: share of the rays that went on, and excess of the rays' single bounces
         self._beyond: list[np.ndarray] = []
         self._excess: list[np.ndarray] = []
@@ -48,18 +52,31 @@ class Balance:
             self._cross[angle] += change * rest
             self._cross_total[angle] += change.sum(axis=1) * rest
 
+    def _over_samples(
+        self, reduce: Callable[..., np.ndarray], values: Sequence[np.ndarray] | np.ndarray
+    ) -> np.ndarray:
+        """Reduce values (samples, angles); one angle of many as if it stood among them.
+
+        NumPy adds up a single column in another order, so with other last digits.
+        """
+        held = np.asarray(values)
+        if self._one_of_many:
+            return reduce(np.repeat(held, 2, axis=1), axis=0)[:1]
+        return reduce(held, axis=0)
+
     def _parts(self) -> tuple[np.ndarray, np.ndarray]:
         """Parts of X that go to further and to single bounces, as factors of their light.
 
         Further (angles,) and single bounces (angles, n_theta, n_dphi).
         """
         beyond, excess = np.array(self._beyond), np.array(self._excess)
-        spread = excess.var(axis=0)
-        shared = ((excess - excess.mean(axis=0)) * -beyond).mean(axis=0)
+        spread = self._over_samples(np.var, excess)
+        change = excess - self._over_samples(np.mean, excess)
+        shared = self._over_samples(np.mean, change * -beyond)
         part = np.divide(shared, spread, out=np.ones_like(spread), where=spread > 0.0)
         part = np.clip(part, 0.0, 1.0)
         # Where no ray went on all light is in single bounces
-        mean = beyond.mean(axis=0)
+        mean = self._over_samples(np.mean, beyond)
         part[mean == 0.0] = 0.0
         further = part / np.where(mean > 0.0, mean, 1.0)
         flux = (self._hidden * self._unit).sum(axis=(1, 2)) / len(excess)
@@ -74,13 +91,13 @@ class Balance:
         slope[:, :, 0] = light[:, :, 0] * single[:, None]
         self._taken = slope[:, :, 0].sum(axis=(2, 3))
         if len(self._excess) > 1:
-            spread = np.var(self._excess, axis=0) * len(self._excess)
+            spread = self._over_samples(np.var, self._excess) * len(self._excess)
             _adjust(scatter, mean, slope, self._cross, spread)
             _adjust(total, mean.sum(axis=2), slope.sum(axis=2), self._cross_total, spread)
             floor = self._floor(mean)
             scatter[:, :, 0] += floor
             total += floor
-        excess = np.mean(self._excess, axis=0)
+        excess = self._over_samples(np.mean, self._excess)
         factor = 1.0 + excess[:, None, None] * single
         mean[:, :, 0] *= factor[:, None, :, :, None, None]
         mean[:, :, 1:] *= (1.0 + excess * further).reshape(-1, *(1,) * (mean.ndim - 1))
@@ -113,7 +130,7 @@ class Balance:
         """Energies (angles, wavelengths, fates) in balance with all that is reflected."""
         energy = energy.copy()
         further, _ = self._parts()
-        scale = 1.0 + np.mean(self._excess, axis=0) * further
+        scale = 1.0 + self._over_samples(np.mean, self._excess) * further
         for fate in (TRUNCATED, LEAKED):
             energy[..., fate] *= scale[:, None]
         rest = 1.0 - albedo.sum(axis=-1) - energy[..., TRUNCATED] - energy[..., LEAKED]

@@ -23,7 +23,7 @@ CURE = (
     "Take fewer directions (theta_i=, phi_i=), wavelengths (wavelength=), bins (n_theta=, "
     "n_dphi=), stokes='linear' or 'unpolarized'"
 )
-_PARTS = "simulate some directions at a time (pbrdf.simulation.simulate_parts)"
+_PARTS = "go direction by direction: -o name.zarr, or pbrdf.simulation.simulate_parts"
 # Arguments of `simulate` that say how large its result is, besides theta_i
 OF_SIZE = ("phi_i", "wavelength", "n_theta", "n_dphi", "stokes")
 # Rays and samples where a plan or a target error will say how many

@@ -22,7 +22,9 @@ WATER = pbrdf.Drops(
     material=pbrdf.Material(1.33),
 )  # fmt: skip
 RUNS = {
-    "looks": (pbrdf.Scene(rough(0.3), GLASS), {"realizations": 4}),
+    "looks": (
+        pbrdf.Scene(rough(0.3), GLASS), {"realizations": 9, "wavelength": [0.5, 0.6]},
+    ),
     # Nothing hides anything at some angles, something at others
     "hardly rough": (pbrdf.Scene(rough(0.05), GLASS), {"realizations": 4}),
     "spectrum": (
@@ -37,7 +39,7 @@ RUNS = {
         pbrdf.Scene(rough(0.3), GLASS, WATER),
         {"realizations": 4, "phi_i": "uniform", "fold": True},
     ),
-    "planned": (pbrdf.Scene(rough(0.3), GLASS), {"realizations": 1, "n_rays": 320}),
+    "one surface": (pbrdf.Scene(rough(0.3), GLASS), {"realizations": 1, "n_rays": 320}),
 }  # fmt: skip
 
 
@@ -64,7 +66,7 @@ def test_a_target_is_for_all_directions_together():
 
 def test_progress_counts_on(monkeypatch):
     heard = []
-    scene, given = RUNS["looks"]
+    scene, given = RUNS["hardly rough"]
     with pytest.warns(AccuracyWarning, match="too few"):
         list(
             simulate_parts(

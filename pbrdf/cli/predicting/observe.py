@@ -97,8 +97,8 @@ def command(
 ) -> None:
     """Simulate the readings of a goniometer with its finite source and detector.
 
-    The result is a scan (.csv) or, with bounces apart, a dataset (.nc), by the name of
-    the output.
+    The result is a scan (.csv) or, with bounces apart, a dataset (.nc, .zarr), by the name
+    of the output.
 
     Example: pbrdf observe scene.toml --scan measured.csv -o simulated.csv
     """
@@ -106,17 +106,18 @@ def command(
 
     import pbrdf
     from data_io import write_goniometer, write_result
+    from data_io.reflectance.result_store import fill_store
     from pbrdf.cli.progress import progress_bar
-    from pbrdf.cli.staging import staged_file
+    from pbrdf.cli.staging import staged_file, staged_store
     from pbrdf.observation.readings import as_scan
 
     loaded = pbrdf.load_scene(scene)
     target_file = output or scene.with_name(f"{scene.stem}-scan.csv")
     waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
-    if waves is not None and len(waves) > 1 and target_file.suffix != ".nc":
+    if waves is not None and len(waves) > 1 and target_file.suffix not in (".nc", ".zarr"):
         msg = (
             f"--wavelength-um must be one number for a scan, got {len(waves)}. "
-            "Name an output that ends in .nc."
+            "Name an output that ends in .nc or .zarr."
         )
         raise ValueError(msg)
     declared = declaring.declarations(
@@ -128,7 +129,9 @@ def command(
     else:
         geometry = _of_scan(scan, None if waves is None else waves[0], declared)
     azimuth = _one_azimuth(phi_i)
-    with staged_file(target_file, force=force) as stage:
+    store = target_file.suffix == ".zarr"
+    staged = staged_store if store else staged_file
+    with staged(target_file, force=force) as stage:
         with progress_bar("observing") as progress:
             result = pbrdf.observe(
                 loaded,
@@ -150,7 +153,9 @@ def command(
                 workers=workers,
                 progress=progress,
             )
-        if target_file.suffix == ".nc":
+        if store:
+            fill_store([result], stage)
+        elif target_file.suffix == ".nc":
             write_result(result, stage)
         else:
             write_goniometer(as_scan(result), stage)

@@ -1,8 +1,9 @@
 """`pbrdf simulate`: trace a scene described by a TOML file."""
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -10,6 +11,8 @@ from pbrdf.cli import options
 from pbrdf.cli.options import Stokes
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     import xarray as xr
 
 
@@ -45,62 +48,91 @@ def command(
 ) -> None:
     """Simulate the Mueller BRDF of a rough surface over the whole hemisphere.
 
+    A result that does not fit into memory goes to a store, direction by direction.
+
     Example: pbrdf simulate scene.toml --theta-i-deg 10,30,60 -o result.nc
+
+    Example: pbrdf simulate scene.toml --theta-i-deg 0,10,20,30 -o result.zarr
     """
     given = dict(locals())
     import numpy as np
 
     import pbrdf
-    from data_io import write_result
     from fitting.report.record import record_of
     from pbrdf.cli.progress import progress_bar
-    from pbrdf.cli.staging import staged_file
     from pbrdf.cli.typed import words_typed
-    from pbrdf.simulation.memory import CURE, asked_size
-    from pbrdf.tracer.memory import check_room, stored
+    from pbrdf.simulation import simulate_parts
 
     loaded = pbrdf.load_scene(scene)
     target_file = options.result_file(output or scene.with_suffix(".nc"))
     if target is None or n_rays is not None or realizations is not None:
         n_rays, realizations = n_rays or 100_000, realizations or 16
     waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
-    size = asked_size(
-        options.incidences(theta_i), options.azimuths(phi_i), waves, n_theta, n_dphi,
-        stokes.value,
+    directions, azimuths = options.incidences(theta_i), options.azimuths(phi_i)
+    size: dict[str, Any] = {
+        "phi_i": azimuths, "wavelength": waves, "n_theta": n_theta, "n_dphi": n_dphi,
+        "stokes": stokes.value,
+    }  # fmt: skip
+    record = record_of(
+        {"scene": scene}, command="simulate", options=options.recorded(given),
+        typed=words_typed(),
     )  # fmt: skip
-    check_room(stored(size), f"{size.words()}, written to netCDF", f"{CURE}.")
-    with staged_file(target_file, force=force) as stage:
-        with progress_bar("tracing") as progress:
-            result = pbrdf.simulate(
-                loaded,
-                options.incidences(theta_i),
-                phi_i=options.azimuths(phi_i),
-                n_rays=n_rays,
-                realizations=realizations,
-                seed=seed,
-                max_bounces=max_bounces,
-                target_rel_error=target,
-                wavelength=waves,
-                n_theta=n_theta,
-                n_dphi=n_dphi,
-                stokes=stokes.value,
-                workers=workers,
-                progress=progress,
-                explain=explain,
-                source_half_angle=float(np.deg2rad(source_half_angle)),
-                fold=fold,
-                wave=wave,
-            )
-        result.attrs["made_by"] = record_of(
-            {"scene": scene}, command="simulate", options=options.recorded(given),
-            typed=words_typed(),
+    store = target_file.suffix == ".zarr"
+    if not store:
+        _check_file(directions, size)
+    lines: list[str] = []
+    # A target error is reached by all directions together
+    apart = store and target is None
+    with (
+        _staged(target_file, force=force, store=store) as stage,
+        progress_bar("tracing") as progress,
+    ):
+        run: Any = partial(
+            simulate_parts if apart else pbrdf.simulate, loaded, directions, n_rays=n_rays,
+            realizations=realizations, seed=seed, max_bounces=max_bounces,
+            target_rel_error=target, workers=workers, progress=progress, explain=explain,
+            fold=fold, wave=wave, source_half_angle=float(np.deg2rad(source_half_angle)),
         )  # fmt: skip
-        write_result(result, stage)
-    for line in [*result.attrs["plan"], *result.attrs["explanation"]]:
-        typer.echo(line)
-    for line in budget(result):
+        made = run(**size) if apart else [run(**size)]
+        parts = (part.assign_attrs(made_by=record) for part in made)
+        _write(_told(parts, lines), stage, store=store)
+    for line in dict.fromkeys(lines):
         typer.echo(line)
     typer.echo(f"Result: {target_file}")
+
+
+def _check_file(directions: Any, size: dict[str, Any]) -> None:
+    """Refuse a result that could be computed, but not written to one file."""
+    from pbrdf.simulation.memory import CURE, asked_size
+    from pbrdf.tracer.memory import check_room, stored
+
+    asked = asked_size(directions, **size)
+    cure = f"{CURE}, or write it direction by direction, -o name.zarr."
+    check_room(stored(asked), f"{asked.words()}, written to netCDF", cure)
+
+
+def _staged(target: Path, *, force: bool, store: bool) -> "AbstractContextManager[Path]":
+    from pbrdf.cli.staging import staged_file, staged_store
+
+    return (staged_store if store else staged_file)(target, force=force)
+
+
+def _write(parts: "Iterator[xr.Dataset]", stage: Path, *, store: bool) -> None:
+    from data_io import write_result
+    from data_io.reflectance.result_store import fill_store
+
+    if store:
+        fill_store(parts, stage)
+        return
+    for result in parts:
+        write_result(result, stage)
+
+
+def _told(parts: "Iterator[xr.Dataset]", lines: list[str]) -> "Iterator[xr.Dataset]":
+    """Put down what is to be said of each part, on its way."""
+    for part in parts:
+        lines += [*part.attrs["plan"], *part.attrs["explanation"], *budget(part)]
+        yield part
 
 
 def budget(result: "xr.Dataset") -> Iterator[str]:

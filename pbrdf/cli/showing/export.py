@@ -32,7 +32,7 @@ def command(
     source: Annotated[
         Path,
         typer.Argument(
-            help="Result (.nc), store of a sweep (.zarr), model or scene (.toml).",
+            help="Result (.nc, .zarr), store of a sweep (.zarr), model or scene (.toml).",
             show_default=False,
         ),
     ],
@@ -102,6 +102,8 @@ def _check(
     source: Path, output: Path, convention: Convention, at: list[str] | None
 ) -> None:
     """Refuse what cannot be written."""
+    from data_io import is_result_store
+
     if output.suffix not in (".pbsdf", ".csv"):
         known = ", ".join((".pbsdf", ".csv", *MESHES))
         msg = f"--output must end in one of {known}, got {output.name!r}."
@@ -112,7 +114,7 @@ def _check(
             f"{source.name!r}."
         )
         raise ValueError(msg)
-    if at and source.suffix != ".zarr":
+    if at and (source.suffix != ".zarr" or is_result_store(source)):
         msg = f"--at must be left out, it is for a store of a sweep, got {source.name!r}."
         raise ValueError(msg)
     if convention is not Convention.pbrdf and output.suffix != ".csv":
@@ -142,7 +144,7 @@ def _result(source: Path, at: list[str] | None, wavelength: float | None) -> "xr
     """Return a result, or a store at one value of each thing that varied."""
     import data_io
 
-    if source.suffix == ".zarr":
+    if source.suffix == ".zarr" and not data_io.is_result_store(source):
         from pbrdf.cli.reading import read_store
 
         return read_store(source, at, wavelength=wavelength)

@@ -27,8 +27,8 @@ def command(
     source: Annotated[
         Path,
         typer.Argument(
-            help="Result (.nc), store of a sweep (.zarr), scene (.toml) or goniometer "
-            "file.",
+            help="Result (.nc, .zarr), store of a sweep (.zarr), scene (.toml) or "
+            "goniometer file.",
             show_default=False,
         ),
     ],
@@ -89,7 +89,7 @@ def command(
 
     target = output or source.with_suffix(".png")
     with staged_file(target, force=force) as stage:
-        if source.suffix == ".nc":
+        if source.suffix == ".nc" or data_io.is_result_store(source):
             result = data_io.read_result(source)
             places = _places(result, theta_i, wavelength, at, one=not plane)
             names = options.names(elements)

@@ -12,7 +12,7 @@ def command(
     source: Annotated[
         Path,
         typer.Argument(
-            help="Result (.nc), or a folder that holds one.", show_default=False
+            help="Result (.nc, .zarr), or a folder that holds one.", show_default=False
         ),
     ],
     output: options.Output = None,
@@ -26,7 +26,8 @@ def command(
     from fitting.report.explorer import page_of
     from pbrdf.cli.staging import staged_file
 
-    file = _result_in(source) if source.is_dir() else source
+    one = not source.is_dir() or data_io.is_result_store(source)
+    file = source if one else _result_in(source)
     with staged_file(output or file.with_suffix(".html"), force=force) as stage:
         page = page_of(data_io.read_result(file), file.name)
         stage.write_text(page, encoding="utf-8")

@@ -1,0 +1,77 @@
+"""Attributes that files can hold, and checksums of variables."""
+
+import hashlib
+import json
+from collections.abc import Hashable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+__all__ = ["CHECKSUMS", "decode", "digest", "encode"]
+
+# Marks an attribute that netCDF cannot hold as it is: truth values, None, lists, mappings
+_JSON = "json:"
+_INT64 = 2**63
+# Attribute that holds the checksum of each variable
+CHECKSUMS = "pbrdf_checksums"
+
+
+def digest(variable: xr.Variable) -> str:
+    """Return a checksum of dimensions, values and attributes."""
+    values = np.ascontiguousarray(variable.to_numpy())
+    text = values.dtype.kind in "OTU"
+    held = values.reshape(-1)
+    content = "\0".join(map(str, held)).encode() if text else held.tobytes()
+    kind = "text" if text else values.dtype.str
+    attrs = sorted((str(key), str(value)) for key, value in variable.attrs.items())
+    head = f"{variable.dims} {values.shape} {kind} {attrs}"
+    return hashlib.sha256(head.encode() + b"\0" + content).hexdigest()
+
+
+def encode(attrs: dict[Any, Any]) -> dict[Any, Any]:
+    """Return attributes that netCDF can hold."""
+    return {name: _encode_one(name, value) for name, value in attrs.items()}
+
+
+def _encode_one(name: Hashable, value: Any) -> str | int | float:
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, str) and not value.startswith(_JSON) and "\x00" not in value:
+        # HDF5 has no empty text of its own
+        return value or _JSON + '""'
+    if isinstance(value, float):
+        return value
+    if isinstance(value, int) and not isinstance(value, bool) and -_INT64 <= value < _INT64:
+        return value
+    try:
+        return _JSON + json.dumps(value, default=_plain)
+    except (TypeError, ValueError) as error:
+        msg = (
+            f"attribute {name} must be text, numbers, lists or mappings, got "
+            f"{type(value).__name__}. Convert it first."
+        )
+        raise TypeError(msg) from error
+
+
+def _plain(value: Any) -> Any:
+    """Return what JSON can write for what it cannot."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError
+
+
+def decode(attrs: dict[Any, Any]) -> dict[Any, Any]:
+    """Return attributes as they were before `encode`; arrays and tuples become lists."""
+    decoded = {}
+    for name, value in attrs.items():
+        if isinstance(value, str) and value.startswith(_JSON):
+            decoded[name] = json.loads(value.removeprefix(_JSON))
+        elif isinstance(value, np.generic):
+            decoded[name] = value.item()
+        else:
+            decoded[name] = value
+    return decoded
