@@ -16,13 +16,14 @@ import xarray as xr
 from fitting.checks.unread import what_is_not_read
 from fitting.models.cuts import plane_curves
 from fitting.models.simulated import SimulatedModel
+from fitting.prediction.measured_slopes import MeasuredSlopes, measured_slopes
 from fitting.quick import GAINS, Clock, Progress, QuickResult, first_look
 from fitting.readings.observations import Mask
 from fitting.readings.wavelengths import one_wavelength
 from fitting.result.fit_result import FitResult
 from fitting.run import fit
 from fitting.statistics.result import SurfaceStatistics
-from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene
+from pbrdf import GaussianSurface, HeightMap, Material, MicrofacetModel, Scene
 from pbrdf.errors import check_seed
 from pbrdf.validity import judge, roughness_of
 
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from data_io import Profile
-    from pbrdf import HeightMap
 
 __all__ = ["PipelineResult", "random_surface", "run_pipeline"]
 
@@ -39,6 +39,8 @@ CELLS = 12
 NODES = 256
 # What a simulation adds to the analytical curve holds for slopes so near to its own
 FAR = 0.1
+# Rays over the map itself, beside those over all realisations
+_SHARE = 8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,12 +60,16 @@ class PipelineResult(QuickResult):
         The Monte Carlo, for unit gain.
     unknown : tuple of str
         What these data cannot tell, in words.
+    measured_slopes : MeasuredSlopes or None
+        Of a map: its own slope distribution beside the Gaussian, and the Monte Carlo over
+        the map itself.
     """
 
     monte_carlo: FitResult
     scan_slope: FitResult | None
     simulation: xr.Dataset
     unknown: tuple[str, ...]
+    measured_slopes: MeasuredSlopes | None = None
 
     @property
     def model(self) -> MicrofacetModel:
@@ -162,6 +168,17 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
                 curve = simulated(scan_slope.model.model)
                 scan_slope = bring(measurement, curve, free=wider)
 
+    own = None
+    if isinstance(look.surface, HeightMap):
+        with clock.stage("slopes as measured"):
+            own = measured_slopes(
+                look.surface, analytic, simulation,
+                material=Material(*analytic.model.material.index()),
+                slope_rms=statistics.slope_rms.value,
+                wavelength=one_wavelength(measurement),
+                n_rays=n_rays * max(realizations // _SHARE, 1), seed=seed, workers=workers,
+            )  # fmt: skip
+
     return PipelineResult(
         surface=surface,
         statistics=statistics,
@@ -181,6 +198,7 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
             *_beyond_optics(measurement, statistics),
             *analytic.warnings,
         ),
+        measured_slopes=own,
         seconds=clock.seconds,
     )
 

@@ -109,6 +109,7 @@ def run_quick(  # noqa: PLR0913  (as run_pipeline)
 class _FirstLook:
     """Statistics of the surface, what to fit given what they know, and the first fit."""
 
+    surface: "Profile | HeightMap"
     statistics: SurfaceStatistics
     free: tuple[str, ...]
     priors: dict[str, tuple[float, float]]
@@ -129,14 +130,15 @@ def first_look(
     """Measure the surface and `bring` the analytical curve to the scan."""
     index = Material(*material.index(one_wavelength(measurement)), name=material.name)
     with clock.stage("surface statistics"):
-        statistics = surface_statistics(mended_once(surface), form=form)
+        mended = mended_once(surface)
+        statistics = surface_statistics(mended, form=form)
     wanted, priors = _slope_knowledge(statistics, free)
     start = MicrofacetModel(
         index, slope_rms=statistics.slope_rms.value, shadowing=shadowing
     )
     with clock.stage("analytical fit"):
         analytic = bring(measurement, start, free=wanted, priors=priors)
-    return _FirstLook(statistics, wanted, priors, analytic)
+    return _FirstLook(mended, statistics, wanted, priors, analytic)
 
 
 def _slope_knowledge(

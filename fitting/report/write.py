@@ -23,6 +23,7 @@ from pbrdf.plots import scan_figure
 
 if TYPE_CHECKING:
     from fitting.pipeline import PipelineResult
+    from fitting.prediction.measured_slopes import MeasuredSlopes
     from fitting.result.fit_result import FitResult
 
 __all__ = ["fit_columns", "result_dataset", "write_report", "write_spectrum"]
@@ -100,11 +101,16 @@ def _in_units(result: "PipelineResult") -> xr.Dataset:
 
 def result_dataset(result: "PipelineResult") -> xr.Dataset:
     """Return simulation, curves and scan as one dataset, the fits as its attributes."""
-    scan = result.measurement
+    scan, own = result.measurement, result.measured_slopes
     angles = {name: f"scan_{name}" for name in scan.coords}
     measured = scan.rename({**angles, **{name: f"scan_{name}" for name in scan.data_vars}})
     together = xr.merge(
-        [result.simulation, result.curves, measured.reset_coords()],
+        [
+            result.simulation,
+            result.curves,
+            measured.reset_coords(),
+            *([] if own is None else [own.to_dataset()]),
+        ],
         combine_attrs="drop",
         compat="no_conflicts",
         join="outer",
@@ -115,6 +121,7 @@ def result_dataset(result: "PipelineResult") -> xr.Dataset:
         "analytic_fit": result.analytic.as_dict(),
         "monte_carlo_fit": result.monte_carlo.as_dict(),
         "analytic_model": model_text(result.model),
+        **({} if own is None else {"measured_slopes": own.as_dict()}),
     }
     return together
 
@@ -206,6 +213,8 @@ def _sections(
         ),
     )
     yield _model_section(fits, figures["scan.png"])
+    if result.measured_slopes is not None:
+        yield _slopes_section(result.measured_slopes)
     yield html.section(
         "Hemisphere",
         hemisphere_view(_layers(result, together)),
@@ -223,6 +232,22 @@ def _sections(
         html.table(
             ("stage", "seconds"),
             [(stage, f"{elapsed:.1f}") for stage, elapsed in seconds.items()],
+        ),
+    )
+
+
+def _slopes_section(own: "MeasuredSlopes") -> str:
+    """Return the section of the map's own slope distribution."""
+    return html.section(
+        "Slopes as measured",
+        html.bullets(own.texts),
+        html.table(
+            ("curve", "M00 off by, rms", "gain", "Lambertian base", "nothing freed"),
+            own.table_rows(),
+        ),
+        html.paragraph(
+            "Errors are relative to each reading. The slopes as measured are those that "
+            "light sees: of patches that diffract as much as they hide."
         ),
     )
 

@@ -236,6 +236,9 @@ def summary(result: "PipelineResult") -> Iterator[str]:
         if not fit.n_estimated:
             yield f"  {'chi2 / dof':<16} {fit.chi2 / fit.dof:.3g}"
         yield f"  {'misfit':<16} {fit.misfit}"
+    if result.measured_slopes is not None:
+        yield "Slopes as measured"
+        yield from (f"  {text}" for text in result.measured_slopes.texts)
     if result.unknown:
         yield "What these data cannot tell"
         for text in result.unknown:
