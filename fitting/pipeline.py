@@ -16,7 +16,7 @@ import xarray as xr
 from fitting.checks.unread import what_is_not_read
 from fitting.models.cuts import plane_curves
 from fitting.models.simulated import SimulatedModel
-from fitting.prediction.measured_slopes import MeasuredSlopes, measured_slopes
+from fitting.prediction.beside_gaussian import MeasuredSlopes, measured_slopes
 from fitting.quick import GAINS, Clock, Progress, QuickResult, first_look
 from fitting.readings.observations import Mask
 from fitting.readings.wavelengths import one_wavelength
@@ -170,13 +170,12 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
 
     own = None
     if isinstance(look.surface, HeightMap):
+        rays = n_rays * max(realizations // _SHARE, 1)
         with clock.stage("slopes as measured"):
             own = measured_slopes(
                 look.surface, analytic, simulation,
-                material=Material(*analytic.model.material.index()),
-                slope_rms=statistics.slope_rms.value,
-                wavelength=one_wavelength(measurement),
-                n_rays=n_rays * max(realizations // _SHARE, 1), seed=seed, workers=workers,
+                slope_rms=statistics.slope_rms.value, n_rays=rays, seed=seed,
+                workers=workers,
             )  # fmt: skip
 
     return PipelineResult(

@@ -23,7 +23,7 @@ from pbrdf.plots import scan_figure
 
 if TYPE_CHECKING:
     from fitting.pipeline import PipelineResult
-    from fitting.prediction.measured_slopes import MeasuredSlopes
+    from fitting.prediction.beside_gaussian import MeasuredSlopes
     from fitting.result.fit_result import FitResult
 
 __all__ = ["fit_columns", "result_dataset", "write_report", "write_spectrum"]

@@ -8,7 +8,7 @@ import xarray as xr
 
 import data_io
 from fitting.pipeline import PipelineResult, run_pipeline
-from fitting.prediction.measured_slopes import ENSEMBLE, GAUSSIAN, MEASURED, OVER_MAP
+from fitting.prediction.beside_gaussian import ENSEMBLE, GAUSSIAN, MEASURED, OVER_MAP
 from fitting.report.write import write_report
 from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
 

@@ -126,9 +126,7 @@ def measured_slopes(
     fitted: "FitResult",
     ensemble: xr.Dataset,
     *,
-    material: Material,
     slope_rms: float,
-    wavelength: float | None,
     **tracing: Any,
 ) -> MeasuredSlopes:
     """Compare the slopes of a mended map, and the Monte Carlo over it, with a Gaussian's.
@@ -138,19 +136,20 @@ def measured_slopes(
     surface : HeightMap
         As mended. [um]
     fitted : FitResult
-        Its readings of M00 are those compared.
+        Of the Gaussian to the scan, at one wavelength. Its readings of M00 are those
+        compared, its index that of the facets. Without a wavelength patches neither smooth
+        nor diffract.
     ensemble : Dataset
         Monte Carlo over Gaussian surfaces, unit gain.
-    material : Material
-        Index of the facets.
     slope_rms : float
         Of the Gaussian, per axis. [1]
-    wavelength : float or None
-        Without it patches neither smooth nor diffract. [um]
     **tracing
         n_rays, seed, workers and progress of `pbrdf.simulate`.
     """
     slopes = slope_distribution(surface)
+    material = Material(*fitted.model.material.index())
+    waves = fitted.readings.wavelength.values
+    wavelength = float(waves[0]) if np.isfinite(waves[0]) else None
     # Without a wavelength, one that is small against everything
     facets = facets_of(surface, wavelength or 1e-3 * min(surface.spacing))
     table = slope_table(facets)
