@@ -168,15 +168,11 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
                 curve = simulated(scan_slope.model.model)
                 scan_slope = bring(measurement, curve, free=wider)
 
-    own = None
-    if isinstance(look.surface, HeightMap):
-        rays = n_rays * max(realizations // _SHARE, 1)
-        with clock.stage("slopes as measured"):
-            own = measured_slopes(
-                look.surface, analytic, simulation,
-                slope_rms=statistics.slope_rms.value, n_rays=rays, seed=seed,
-                workers=workers,
-            )  # fmt: skip
+    with clock.stage("slopes as measured"):
+        own = _own_slopes(
+            look.surface, analytic, simulation, statistics.slope_rms.value,
+            n_rays=n_rays * max(realizations // _SHARE, 1), seed=seed, workers=workers,
+        )  # fmt: skip
 
     return PipelineResult(
         surface=surface,
@@ -200,6 +196,19 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
         measured_slopes=own,
         seconds=clock.seconds,
     )
+
+
+def _own_slopes(
+    surface: "Profile | HeightMap",
+    fitted: FitResult,
+    ensemble: xr.Dataset,
+    slope_rms: float,
+    **tracing: Any,
+) -> MeasuredSlopes | None:
+    """Compare the slopes of a map with a Gaussian's; a profile has none across it."""
+    if not isinstance(surface, HeightMap):
+        return None
+    return measured_slopes(surface, fitted, ensemble, slope_rms=slope_rms, **tracing)
 
 
 def random_surface(statistics: SurfaceStatistics, slope_rms: float) -> GaussianSurface:
