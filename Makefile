@@ -96,7 +96,7 @@ COMPILE := $(UV) pip compile --universal --python-version 3.11 --generate-hashes
 
 lock: .venv/.installer
 	$(COMPILE) --all-extras pyproject.toml -o locks/all.lock
-	$(COMPILE) -c locks/all.lock --extra dev --extra docs --extra formats --extra sweeps \
+	$(COMPILE) -c locks/all.lock --extra dev --extra docs --extra formats --extra sun --extra sweeps \
 		pyproject.toml -o locks/dev.lock
 	$(COMPILE) -c locks/all.lock pyproject.toml -o locks/run.lock
 	$(COMPILE) -c locks/all.lock locks/installer.in -o locks/installer.lock

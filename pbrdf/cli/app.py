@@ -126,11 +126,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _fail(error, f"out of memory. {_MEMORY}", FAILED)
         except ValueError as error:
             return _fail(error, _in_words_of_the_command(_sentence(error), arguments))
-        except (KeyboardInterrupt, typer.Abort):
-            typer.echo("Interrupted; nothing was written.", err=True)
+        except (KeyboardInterrupt, typer.Abort) as error:
+            typer.echo(f"Interrupted; {_kept(error)}.", err=True)
             return INTERRUPTED
-        except TerminatedError:
-            typer.echo("Terminated; nothing was written.", err=True)
+        except TerminatedError as error:
+            typer.echo(f"Terminated; {_kept(error)}.", err=True)
             return TERMINATED
     return code if isinstance(code, int) else 0
 
@@ -150,6 +150,11 @@ def _ending_in_order() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, earlier)
+
+
+def _kept(error: BaseException) -> str:
+    """Say what an ended command leaves: what it noted on the way out, or nothing."""
+    return "; ".join(getattr(error, "__notes__", [])) or "nothing was written"
 
 
 def _fail(error: Exception, message: str, code: int = BAD_INPUT) -> int:

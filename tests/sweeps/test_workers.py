@@ -155,3 +155,22 @@ def test_a_lost_scheduler_leaves_a_store_that_goes_on(serial: Path, tmp_path: Pa
     report = run_sweep(sweep, path, workers=1)
     assert report.kept >= 3
     xr.testing.assert_identical(opened(path), opened(serial))
+
+
+def test_a_terminated_sweep_says_what_it_keeps(tmp_path: Path) -> None:
+    written(tmp_path, MANY)
+    command = f"{ALONE}from pbrdf.cli import main; import sys; sys.exit(main())"
+    path = tmp_path / "s.zarr"
+    run = subprocess.Popen(
+        [sys.executable, "-W", "ignore", "-c", command, "-q", "sweep",
+         str(tmp_path / "sweep.toml"), "-o", str(path), "--workers", "1"],
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 300
+    while not list((path / "marks").glob("*.json")):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    run.send_signal(signal.SIGTERM)
+    _, told = run.communicate(timeout=60)
+    assert run.returncode == 143
+    assert told == f"Terminated; {path} keeps what is finished, the same command goes on.\n"

@@ -42,6 +42,19 @@ def command(
         float,
         typer.Option("--sun-azimuth-deg", min=-360.0, max=360.0, help="Of the sun."),
     ] = 180.0,
+    time: Annotated[
+        str | None,
+        typer.Option(
+            help="In place of the sun's angles, with --latitude-deg, --longitude-deg: "
+            "2026-06-21T12:00+02:00. Azimuths are then counter-clockwise from east."
+        ),
+    ] = None,
+    latitude: Annotated[
+        float | None, typer.Option("--latitude-deg", min=-90.0, max=90.0, help="North.")
+    ] = None,
+    longitude: Annotated[
+        float | None, typer.Option("--longitude-deg", min=-180.0, max=180.0, help="East.")
+    ] = None,
     sun_irradiance: Annotated[
         float | None,
         typer.Option(
@@ -83,6 +96,13 @@ def command(
     wavelength: Annotated[
         str | None, typer.Option("--wavelength-um", help="Wavelengths, by commas.")
     ] = None,
+    band: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of a band: wavelength_um, response. The mean over it, weighted, from "
+            "--wavelength-um that cover it."
+        ),
+    ] = None,
     output: options.Output = None,
     force: options.Force = False,
 ) -> None:
@@ -99,10 +119,14 @@ def command(
     import pbrdf
     from data_io import write_result
     from pbrdf.cli.staging import staged_file
+    from pbrdf.signatures import in_band, read_response
 
     waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
     views = options.angles(view_zenith, "--view-zenith-deg", below=90.0)
     azimuths = np.deg2rad(options.numbers(view_azimuth, "--view-azimuth-deg"))
+    if time is not None or latitude is not None or longitude is not None:
+        sun_zenith, sun_azimuth = _sun_at(time, latitude, longitude, sun_zenith)
+    response = None if band is None else read_response(band)
     sun, skies = _lights(
         sun_zenith=sun_zenith, sun_azimuth=sun_azimuth, sun_irradiance=sun_irradiance,
         planck_sun=planck_sun, optical_depth=optical_depth, sky=sky,
@@ -120,6 +144,7 @@ def command(
             _read(source), views, phi_s=azimuths, wavelength=waves, sun=sun,
             sky=skies or None, temperature=temperature,
         )  # fmt: skip
+        seen = seen if response is None else in_band(seen, response)
         if target.suffix == ".nc":
             write_result(seen, stage)
         else:
@@ -129,6 +154,27 @@ def command(
     brightest = seen.radiance.sel(stokes="I")
     typer.echo(f"largest I {float(brightest.max()):.5g} {seen.radiance.units}")
     typer.echo(f"Result: {target}")
+
+
+def _sun_at(
+    time: str | None,
+    latitude: float | None,
+    longitude: float | None,
+    sun_zenith: float | None,
+) -> tuple[float, float]:
+    """Return zenith and azimuth of the sun at a place and time. [deg]"""
+    from math import degrees, radians
+
+    from pbrdf.signatures import sun_position
+
+    if time is None or latitude is None or longitude is None or sun_zenith is not None:
+        msg = (
+            "--time, --latitude-deg and --longitude-deg must be given together, and "
+            "without --sun-zenith-deg."
+        )
+        raise ValueError(msg)
+    theta, phi = sun_position(time, radians(latitude), radians(longitude))
+    return degrees(theta), degrees(phi)
 
 
 def _lights(

@@ -203,12 +203,11 @@ def _store(
                 sweep, target, client=client, workers=workers, part=part, replace=force,
                 progress=progress,
             )  # fmt: skip
-        except KeyboardInterrupt:
-            typer.echo(
-                f"Interrupted; {target} keeps what is finished. The same command goes on.",
-                err=True,
-            )
-            raise typer.Exit(130) from None
+        except BaseException as error:
+            if not isinstance(error, Exception):
+                # Ended from outside
+                error.add_note(f"{target} keeps what is finished, the same command goes on")
+            raise
 
 
 def _tell(report: "Report") -> None:
