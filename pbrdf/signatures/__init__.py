@@ -9,7 +9,7 @@ from pbrdf.signatures.run import signature
 from pbrdf.signatures.skies import OvercastSky, SkyTable, ThermalSky, read_sky
 from pbrdf.signatures.smooth import SmoothSurface
 from pbrdf.signatures.sun import Sun
-from pbrdf.signatures.sun_position import sun_position
+from pbrdf.signatures.sun_place import sun_position
 
 __all__ = [
     "OvercastSky",

@@ -157,6 +157,16 @@ def test_a_lost_scheduler_leaves_a_store_that_goes_on(serial: Path, tmp_path: Pa
     xr.testing.assert_identical(opened(path), opened(serial))
 
 
+@pytest.mark.slow
+def test_random_kills_of_everybody_leave_the_serial_store() -> None:
+    """The short version of `python -m tests.sweeps.kill --kills 20`."""
+    from tests.sweeps.kill import run
+
+    told = run(kills=3, seed=random.SystemRandom().randrange(2**31))
+    assert told["different"] == told["written again"] == 0
+    assert min(told["worker"], told["scheduler"], told["client"]) >= 1
+
+
 def test_a_terminated_sweep_says_what_it_keeps(tmp_path: Path) -> None:
     written(tmp_path, MANY)
     command = f"{ALONE}from pbrdf.cli import main; import sys; sys.exit(main())"
