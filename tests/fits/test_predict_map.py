@@ -1,10 +1,14 @@
 """Prediction from a map: clean maps follow the Monte Carlo, terraces follow their truth."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
 from scipy import ndimage
 
+import data_io
 import fitting
 from fitting.prediction.comparison import misfit
 from fitting.prediction.facets import diffraction, facets_of, slope_table
@@ -17,6 +21,7 @@ from pbrdf import (
     Scene,
     simulate,
 )
+from pbrdf.cli import main
 
 GLASS = Material(1.5)
 
@@ -193,3 +198,32 @@ def test_free_density_of_a_scan_is_that_of_its_facets() -> None:
     # Rayleigh's law of |slope|
     median = found.quantile(np.array([0.5]))[0]
     assert median == pytest.approx(0.22 * np.sqrt(2 * np.log(2)), rel=0.05)
+
+
+def test_command_tells_what_any_slopes_would_leave(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    angles = np.deg2rad(np.meshgrid([10.0, 45.0], np.arange(0.0, 76.0, 3.0), [180, 140]))
+    theta_i, theta_s, dphi = (a.ravel() for a in angles)
+    model = MicrofacetModel(GLASS, slope_rms=0.2)
+    readings = 0.8 * model.brdf(theta_i, theta_s, dphi)[..., 0, 0] + 0.02 / np.pi
+    coords = {"theta_i": theta_i, "theta_s": theta_s, "dphi": dphi}
+    scan = xr.Dataset(
+        {"M00": ("geometry", readings)},
+        coords={k: ("geometry", v) for k, v in coords.items()},
+    )
+    data_io.write_goniometer(scan, tmp_path / "scan.csv")
+    np.save(tmp_path / "map.npy", ground(0.3, n=96).heights)
+    words = ["predict", str(tmp_path / "map.npy"), "--spacing-um", "1", "--n", "1.5"]
+    words += ["--scan", str(tmp_path / "scan.csv"), "--wavelength-um", "0.65"]
+    assert main(words) == 0
+    told = capsys.readouterr().out
+    left = re.search(r"Any isotropic slopes .* off by (\d+)% with gain ([\d.]+)", told)
+    assert left is not None, told
+    assert int(left[1]) <= 3
+    assert float(left[2]) == pytest.approx(0.8, rel=0.06)
+    # Rayleigh's median of 0.2 in the scan, and of 0.3 on the map
+    halves = re.search(r"scan [\d.]+ / ([\d.]+) .* map [\d.]+ / ([\d.]+)", told)
+    assert halves is not None, told
+    assert float(halves[1]) == pytest.approx(0.2 * 1.177, rel=0.06)
+    assert float(halves[2]) == pytest.approx(0.3 * 1.177, rel=0.12)

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +11,7 @@ import typer
 from pbrdf.cli import declaring, options
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
 
     from fitting.prediction.prediction import Prediction
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 _ASSUMED = 0.65
 # Beyond this zenith goniometers see their own sample holder [deg]
 _FURTHEST = 80.0
+# Fewer readings than nodes of a slope density determine none
+_FEWEST = 40
 
 
 def command(
@@ -65,8 +69,9 @@ def command(
 ) -> None:
     """Predict the Mueller BRDF of a coating from its height map and its index.
 
-    Nothing is fitted. A scan is compared only afterwards: absolute, and with gain and
-    Lambertian base freed. With --output writes the prediction at the directions of the
+    Nothing is fitted. A scan is compared only afterwards: absolute, with gain and
+    Lambertian base freed, and with the slopes freed too, as far as any facet model can
+    come. With --output writes the prediction at the directions of the
     scan, or in the plane, as a goniometer file (.csv).
 
     Example: pbrdf predict map.npy --spacing-um 0.2268 --n 1.5 --scan scan.csv
@@ -106,7 +111,11 @@ def command(
             write_goniometer(predicted.drop_vars(["low", "high"]), stage)
     for note in found.notes:
         typer.echo(note)
-    lines = _brightest(predicted) if measured is None else _compared(predicted, measured)
+    lines = (
+        _brightest(predicted)
+        if measured is None
+        else chain(_compared(predicted, measured), _free_slopes(found, measured))
+    )
     for line in lines:
         typer.echo(line)
     if output is not None:
@@ -181,6 +190,47 @@ def _brightest(predicted: "xr.Dataset") -> Iterator[str]:
         )
 
 
+def _counted(scan: "xr.Dataset") -> "np.ndarray":
+    """Return which readings of M00 are compared."""
+    import numpy as np
+
+    measured = scan.M00.values
+    low_enough = scan.theta_s.values <= np.deg2rad(_FURTHEST + 0.01)
+    return np.asarray(np.isfinite(measured) & (measured > 0) & low_enough)
+
+
+def _free_slopes(found: "Prediction", scan: "xr.Dataset") -> Iterator[str]:
+    """Yield what the best isotropic slope density leaves, and its |slope| beside the map's.
+
+    Diagnostic of the scan: nothing of it goes into the prediction.
+    """
+    import numpy as np
+
+    from fitting.prediction.scan_density import free_density
+    from pbrdf import Material
+
+    counted = _counted(scan)
+    if counted.sum() < _FEWEST:
+        return
+    theta_i, theta_s, dphi = (
+        scan[name].values[counted] for name in ("theta_i", "theta_s", "dphi")
+    )
+    index = Material(*found.model.material.index(found.wavelength))
+    best = free_density(theta_i, theta_s, dphi, scan.M00.values[counted], index)
+    yield (
+        f"Any isotropic slopes whatever, single bounces: off by {best.error:.0%} with gain "
+        f"{best.gain:.3g} and base {best.diffuse_albedo:.3g}"
+    )
+    shares = np.array([0.25, 0.5, 0.75, 0.9])
+    patches = np.hypot(found.facets.slope_x, found.facets.slope_y)
+    of_scan = " / ".join(f"{v:.2f}" for v in best.quantile(shares))
+    of_map = " / ".join(f"{v:.2f}" for v in np.quantile(patches, shares))
+    yield (
+        f"  |slope| at 25/50/75/90 %: scan {of_scan}; patches of the map {of_map}, before "
+        f"a blur of {found.facets.blur:.2f} per axis"
+    )
+
+
 def _compared(predicted: "xr.Dataset", scan: "xr.Dataset") -> Iterator[str]:
     """Yield the misfit by angle and over all."""
     import numpy as np
@@ -195,8 +245,7 @@ def _compared(predicted: "xr.Dataset", scan: "xr.Dataset") -> Iterator[str]:
     if scan.attrs.get("quantity") == "relative":
         yield "The scan is relative: look at the misfit with free gain only."
     measured = scan.M00.values
-    low_enough = predicted.theta_s.values <= np.deg2rad(_FURTHEST + 0.01)
-    counted = np.isfinite(measured) & (measured > 0) & low_enough
+    counted = _counted(scan)
     yield f"M00 against the scan, {int(counted.sum())} readings to {_FURTHEST:g} deg:"
     thetas = np.round(predicted.theta_i.values, 6)
     for theta in [*np.unique(thetas[counted]), None]:
