@@ -81,7 +81,7 @@ def _decode(path: Path) -> np.ndarray:
     """Return the samples of a single picture that is large enough."""
     from skimage import io
 
-    _check_pixels(path, file_size(path))
+    check_pixels(path, file_size(path))
     try:
         # A decoder that refuses a file leaves it open; this closes it
         with path.open("rb") as stream:
@@ -110,7 +110,7 @@ def _decode(path: Path) -> np.ndarray:
     return image
 
 
-def _check_pixels(path: Path, size: int) -> None:
+def check_pixels(path: Path, size: int) -> None:
     """Refuse a picture that would fill the memory, by what its header says."""
     from PIL import Image, UnidentifiedImageError
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from data_io.micrograph.levels import check_pixels
 from data_io.text.files import read_bytes
 from pbrdf.errors import DataFileError
 
@@ -29,7 +30,7 @@ def read_height_picture(path: Path, um_per_level: float) -> np.ndarray:
     if not np.isfinite(um_per_level) or um_per_level <= 0:
         msg = f"um_per_level must be positive [um], got {um_per_level}. Give a height."
         raise ValueError(msg)
-    read_bytes(path)
+    check_pixels(path, len(read_bytes(path)))
     from skimage import io
 
     try:

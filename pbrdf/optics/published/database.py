@@ -1,6 +1,7 @@
 """YAML files of the refractiveindex.info database."""
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ _TABLES = {
     "tabulated n": ("n",),
     "tabulated k": ("kappa",),
 }
+# Far beyond any entry: characters, levels and parts
+_LARGEST, _DEEPEST, _MOST_PARTS = 8_000_000, 20, 100_000
 _FORMULA = re.compile(r"formula\s+(\d+)")
 _TAG = re.compile(r"<[^<>]*>")
 
@@ -52,8 +55,15 @@ def _parse(path: Path, text: str) -> dict[str, Any]:
     # Only who reads such a file pays for the parser
     import yaml
 
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    if len(text) > _LARGEST:
+        problem = f"expected at most {_LARGEST // 10**6} MB, got more"
+        raise DataFileError(path, problem, "Pass an entry of the database.")
     try:
-        entry = yaml.safe_load(text)
+        _check_events(path, yaml.parse(text, Loader=loader))
+        entry = yaml.load(text, Loader=loader)
+    except DataFileError:
+        raise
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         problem = f"is not valid YAML: {' '.join(str(error).split())[:120]}"
         raise DataFileError(path, problem, "Download the entry again.") from error
@@ -61,6 +71,24 @@ def _parse(path: Path, text: str) -> dict[str, Any]:
         problem = "expected an entry of the refractiveindex.info database"
         raise DataFileError(path, problem, "It has the keys REFERENCES and DATA.")
     return entry
+
+
+def _check_events(path: Path, events: Iterable[Any]) -> None:
+    """Refuse what can grow without end when it is built: references, and deep nesting."""
+    import yaml
+
+    depth = count = 0
+    for event in events:
+        count += 1
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if isinstance(event, yaml.AliasEvent):
+            problem = "refers to another part of itself (an alias), as no entry does"
+        elif depth > _DEEPEST or count > _MOST_PARTS:
+            problem = "nests too deeply" if depth > _DEEPEST else "has too many parts"
+        else:
+            continue
+        raise DataFileError(path, problem, "Download the entry again.")
 
 
 def _constants(path: Path, part: Any) -> dict[str, Dispersion]:

@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pbrdf.errors import DataFileError, real_array
+from pbrdf.files import file_size
+from pbrdf.surface.mesh.promises import check_promises
 
 FORMATS = (".stl", ".ply", ".obj", ".glb", ".gltf", ".off")
 # Arrays `vertices`, `faces` and perhaps `labels`, in float64
@@ -45,6 +47,8 @@ def read_mesh_file(path: Path) -> Raw:
         )  # fmt: skip
     if not path.is_file():
         raise DataFileError(path, "is not there, or no file", "Check the path.")
+    file_size(path)
+    check_promises(path)
     try:
         if suffix == OWN_FORMAT:
             return _own(path)
