@@ -32,6 +32,8 @@ _ISOTROPIC = 1.2
 _BIN = 0.1
 _KERNEL = 0.15
 _NODES = 161
+# Slopes that are those of rounding
+_FLAT = 1e-6
 # Facets beyond this share of all lie in the last cells of the table
 _WITHIN = 0.9995
 # Patches are sought between a twentieth of a wavelength and this many, each so much larger
@@ -131,7 +133,7 @@ def facets_of(
     Raises
     ------
     ValueError
-        If the map has fewer than 100 cells of known heights.
+        If the map has fewer than 100 cells of known heights, or is flat.
     """
     slopes, known = _known_slopes(surface)
     extent = min(n * d for n, d in zip(surface.shape, surface.spacing, strict=True))
@@ -177,7 +179,14 @@ def _known_slopes(surface: HeightMap) -> tuple[list[Array], Array]:
             "Give a larger map."
         )
         raise ValueError(msg)
-    return [np.where(known, s - s[known].mean(), 0.0) for s in slopes], known
+    about = [np.where(known, s - s[known].mean(), 0.0) for s in slopes]
+    if not any(np.abs(s).max() > _FLAT for s in about):
+        msg = (
+            f"surface must be rough, got slopes below {_FLAT:g} about its mean plane. "
+            "A mirror sends all light into one beam and has no BRDF."
+        )
+        raise ValueError(msg)
+    return about, known
 
 
 def _aspect(slopes: list[Array], known: Array, surface: HeightMap) -> float:

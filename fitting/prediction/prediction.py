@@ -14,6 +14,8 @@ Array = np.ndarray
 
 # Points an axis of the second bounce: 2 % of a small term
 _NODES = 24
+# Slope of the second bounce where most of a map, or one of its axes, is flat
+_LEAST = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,10 +119,10 @@ class Prediction:
         # A Gaussian of unit slopes has its median at 1.18,
         scale = np.median(self.facets.radius) / np.sqrt(2 * np.log(2))
         widths, _ = self.facets.principal
-        slope: float | tuple[float, float] = float(scale * widths[0])
+        slope: float | tuple[float, float] = max(float(scale * widths[0]), _LEAST)
         if widths[0] != widths[1]:
             slope = (
-                float(scale * np.std(self.facets.slope_x)),
-                float(scale * np.std(self.facets.slope_y)),
+                max(float(scale * np.std(self.facets.slope_x)), _LEAST),
+                max(float(scale * np.std(self.facets.slope_y)), _LEAST),
             )
         return MicrofacetModel(self.model.material, slope_rms=slope)

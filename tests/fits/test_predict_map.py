@@ -182,6 +182,23 @@ def test_bad_arguments_are_named() -> None:
         fitting.predict(3.0, GLASS, wavelength=0.65)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="wavelength must be positive"):
         fitting.predict(ground(0.2, n=64), GLASS, wavelength=-1.0)
+    with pytest.raises(ValueError, match="surface must be rough"):
+        fitting.predict(HeightMap(np.zeros((64, 64)), 1.0), GLASS, wavelength=0.65)
+    with pytest.raises(ValueError, match="100 cells of known heights"):
+        fitting.predict(
+            HeightMap(ground(0.2, n=64).heights[:8, :8], 1.0), GLASS, wavelength=0.65
+        )
+
+
+@pytest.mark.parametrize("along", [0, 1])
+def test_a_grating_scatters_along_its_wave_vector(along: int) -> None:
+    wave = np.sin(np.arange(128) * 2 * np.pi / 32)
+    heights = np.broadcast_to(wave[:, None], (128, 128))
+    surface = HeightMap(heights if along == 0 else heights.T, 1.0, periodic=True)
+    found = fitting.predict(surface, GLASS, wavelength=0.65)
+    phi_i = np.array([0.0, np.pi / 2])
+    m00 = found.brdf(0.5, 0.3, np.pi, phi_i=phi_i)[:, 0, 0]
+    assert m00[along] > 10 * m00[1 - along]
 
 
 def test_free_density_of_a_scan_is_that_of_its_facets() -> None:
