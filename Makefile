@@ -6,6 +6,7 @@
 #   make lint     style, types and the layer rule
 #   make stability  the table of numerical hazards with what was measured of each
 #   make fuzz     damaged files of every format against the readers (COUNT=10000)
+#   make faults   kills, twin runs and full disks against real runs (KILLS=50 TWINS=20)
 #   make bench    speed as ratios, then run time against true error (BENCH=--quick)
 #   make studies  the study folders
 #   make docs     the documentation as a web site     make lock      renew the locks
@@ -13,7 +14,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo demo-seeds test test-all lint stability fuzz bench studies docs lock clean
+.PHONY: help demo demo-seeds test test-all lint stability fuzz faults bench studies docs lock clean
 
 # The first interpreter that starts and is new enough; set PYTHON to choose another
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
@@ -74,6 +75,11 @@ stability: .venv/.dev
 COUNT ?= 2000
 fuzz: .venv/.dev
 	PYTHONPATH=. $(BIN)/python tests/fuzz/run.py --count $(COUNT)
+
+KILLS ?= 50
+TWINS ?= 20
+faults: .venv/.dev
+	PYTHONPATH=. $(BIN)/python tests/faults/run.py --kills $(KILLS) --twins $(TWINS)
 
 # What python -m pbrdf.bench is told: --quick --case rough, say
 BENCH ?=
