@@ -4,7 +4,8 @@
 
 Every kill is SIGKILL (of the client sometimes SIGTERM) at a random moment. After the last
 one the sweep runs to its end and its store is compared with that of a serial run, bit by
-bit; marks that stood before a kill must not have been written again.
+bit; marks that stood before a kill are written again only where a worker, of two threads,
+had them in flight for a client or scheduler that was killed.
 """
 
 import argparse
@@ -179,7 +180,9 @@ def main() -> None:
     started = time.perf_counter()
     told = run(given.kills, seed)
     print(f"seed {seed}: {told}, {time.perf_counter() - started:.0f} s")
-    if told["different"] or told["written again"]:
+    if told["different"] or told["written again"] > 2 * (
+        told["client"] + told["scheduler"]
+    ):
         sys.exit(1)
 
 

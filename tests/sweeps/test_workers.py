@@ -163,7 +163,9 @@ def test_random_kills_of_everybody_leave_the_serial_store() -> None:
     from tests.sweeps.kill import run
 
     told = run(kills=3, seed=random.SystemRandom().randrange(2**31))
-    assert told["different"] == told["written again"] == 0
+    assert told["different"] == 0
+    # A worker of two threads ends what it has in flight for a client that is dead
+    assert told["written again"] <= 2 * (told["client"] + told["scheduler"])
     assert min(told["worker"], told["scheduler"], told["client"]) >= 1
 
 
