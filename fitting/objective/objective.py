@@ -250,8 +250,9 @@ class Objective:
         cost, gradient = self.cost_gradient(x)
         pressed = ((x <= self.low) & (gradient > 0)) | ((x >= self.high) & (gradient < 0))
         step = self.whitening(x).T @ np.where(pressed, 0.0, gradient)
-        # Data without noise can be met to rounding; then the cost is no measure of itself
-        rounding = 1e-15 * float(np.linalg.norm(self.data / self.stderr))
+        # Data without noise can be met to rounding, which grows with the nodes of a cone's
+        # average; then the cost is no measure of itself
+        rounding = 1e-12 * float(np.linalg.norm(self.data / self.stderr))
         return float(np.linalg.norm(step)) <= max(1e-7 * cost, rounding)
 
     def with_data(self, data: np.ndarray, stderr: np.ndarray) -> "Objective":

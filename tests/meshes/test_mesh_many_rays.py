@@ -69,9 +69,10 @@ MeshSurface.of_map(rough).to_trimesh().export(sys.argv[1])
 print(*rough.size)
 """
 COMPILE = """
-from pbrdf import HeightMap, Material, MeshSurface, Scene, simulate
-flat = MeshSurface.of_map(HeightMap.flat((3.0, 2.0)))
-simulate(Scene(flat, Material(1.5)), 0.5, n_rays=6400, n_theta=9, n_dphi=12)
+from pbrdf import GaussianSurface, Material, MeshSurface, Scene, simulate
+rough = GaussianSurface(shape=(24, 24), spacing=0.3, corr_length=3, slope_rms=0.4)
+mesh = MeshSurface.of_map(rough.sample(1))
+simulate(Scene(mesh, Material(1.5)), 0.5, n_rays=100_000, n_theta=9, n_dphi=12)
 """
 MILLION = """
 import resource, sys, time
