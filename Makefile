@@ -87,11 +87,13 @@ bench: .venv/.all
 	$(BIN)/python -m pytest -m bench -s
 	$(BIN)/python -m pbrdf.bench $(BENCH)
 
-# One of them: make studies STUDY=real_coatings
+# One of them: make studies STUDY=real_coatings; those with a quick mode: make studies QUICK=1
 STUDY ?= *
+QUICK ?=
+WITH := $(if $(QUICK),"--quick",__main__)
 studies: .venv/.all
-	@set -e; for script in $$(grep -l __main__ studies/$(STUDY)/*.py); do \
-		echo "== $$script"; PYTHONPATH=. $(BIN)/python $$script; done
+	@set -e; for script in $$(grep -l -e $(WITH) studies/$(STUDY)/*.py); do \
+		echo "== $$script"; PYTHONPATH=. $(BIN)/python $$script $(if $(QUICK),--quick); done
 
 docs: .venv/.dev
 	PYTHONPATH=. $(BIN)/python docs/make_pages.py

@@ -54,7 +54,7 @@ class DataFileError(ValueError):
         line: int | None = None,
         column: str | None = None,
     ) -> None:
-        place = Path(path).name
+        place = shortened(Path(path).name, 120)
         if line is not None:
             place += f" line {line}"
         if column is not None:

@@ -1,10 +1,10 @@
 """The vectorising functions against 40-digit arithmetic, at their awkward arguments too."""
 
 import mpmath
+import numba
 import numpy as np
 import pytest
 
-from pbrdf.kernels import jit
 from pbrdf.kernels.optics import elementary
 
 HALF_TURNS = np.pi / 2 * np.arange(-7, 8)
@@ -14,7 +14,7 @@ def evaluate(name, x):
     """Values of one function in a loop of its own, which then is a vector loop."""
     function = getattr(elementary, name)
 
-    @jit(cache=False)
+    @numba.njit(nogil=True, error_model="numpy")
     def fill(x, out):
         for k in range(x.size):
             out[k] = function(x[k])

@@ -16,6 +16,7 @@ import xarray as xr
 import data_io
 import pbrdf
 from pbrdf.errors import DataFileError
+from pbrdf.sweeps import load_sweep
 
 FAULTS = Path(__file__).parent / "faults"
 
@@ -202,3 +203,11 @@ def test_an_entity_in_utf_16_is_seen(tmp_path):
     path = tmp_path / "map.x3p"
     path.write_bytes(content.getvalue())
     refused(path, "entities")
+
+
+def test_a_long_name_does_not_make_a_long_message(tmp_path):
+    sweep = tmp_path / "sweep.toml"
+    sweep.write_text(f'scene = "{4000 * "x"}"\n[vary]\n"substrate.n" = [1.5]\n')
+    with pytest.raises(DataFileError) as caught:
+        load_sweep(sweep)
+    assert len(str(caught.value)) < 300
