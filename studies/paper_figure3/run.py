@@ -65,7 +65,7 @@ def main():
     settings = tomllib.loads(Path(arguments.parameters).read_text())
     options = settings["quick"] if arguments.quick else {}
     made = scenes(settings)
-    slope = made["clean"].surface.slope_rms
+    slope = made["clean"].surface.facet_slope_rms[0]
     print(f"facet slope rms {slope:.4f}; the caption says {CAPTION_SLOPE:g}\n")
     scene_picture(made["with spheres"]).savefig(HERE / "figure3.png", dpi=160)
     results = {name: traced(scene, settings, options) for name, scene in made.items()}

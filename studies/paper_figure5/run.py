@@ -78,18 +78,19 @@ def table(settings, options):
 
 
 def draw(settings, options):
-    """Polar plots of both and their difference, and the plane of incidence."""
+    """Polar plots of both, and both in the plane of incidence."""
     drawn = settings["drawn"]
     result = traced(settings, drawn["slope"], drawn["n"], **options)
     model = as_result(MicrofacetModel(Material(drawn["n"]), drawn["slope"]), result)
+    place = {"theta_i": np.deg2rad(drawn["incidence_deg"])}
+    for name, one in (("traced", result), ("model", model)):
+        figure = hemisphere(one, drawn["elements"], places=place)
+        figure.savefig(HERE / f"{name}.png", dpi=160)
     both = xr.concat(
         [result[["brdf_total", "brdf_total_stderr"]], model],
         xr.DataArray(["Monte Carlo", "model"], dims="state", name="state"),
         combine_attrs="override",
     )
-    place = {"theta_i": np.deg2rad(drawn["incidence_deg"])}
-    figure = hemisphere(both, drawn["elements"], minus="model", places=place)
-    figure.savefig(HERE / "figure5.png", dpi=160)
     plane_cuts(both, drawn["elements"], places=place).savefig(HERE / "plane.png", dpi=160)
 
 

@@ -39,6 +39,8 @@ def draw(edge, profile, found, n_bins):
         z * edge.height_rms, norm.pdf(z) / edge.height_rms, color="black",
         label=f"Gaussian, rms {edge.height_rms:g} um",
     )  # fmt: skip
+    read = found.height_rms.value
+    left.plot(z * read, norm.pdf(z) / read, "--", color="black", label=f"rms {read:.3g} um")
     left.set(xlabel="height [um]", ylabel="density [1/um]")
     middle = (slopes.edges[1:] + slopes.edges[:-1]) / 2
     right.errorbar(
@@ -49,9 +51,12 @@ def draw(edge, profile, found, n_bins):
         z * edge.slope_rms, norm.pdf(z) / edge.slope_rms, color="black",
         label=f"Gaussian, rms {edge.slope_rms:.4f}",
     )  # fmt: skip
+    read = found.slope_rms.value
+    right.plot(z * read, norm.pdf(z) / read, "--", color="black", label=f"rms {read:.3g}")
     right.set(xlabel="slope", ylabel="density", xlim=(-1.1, 1.1))
     for axis in axes.flat:
-        axis.legend(frameon=False, fontsize=7)
+        axis.set_ylim(0.0, 1.45 * axis.get_ylim()[1])
+        axis.legend(frameon=False, fontsize=7, ncols=2, loc="upper center")
     figure.savefig(HERE / "figure7.png", dpi=160)
 
 
@@ -62,15 +67,24 @@ def main():
     settings = tomllib.loads(Path(parser.parse_args().parameters).read_text())
     edge, profile = measured(settings)
     found = surface_statistics(profile)
-    print("| quantity | truth of the ensemble | read from the picture | 95 % |")
-    print("|---|---|---|---|")
+    own = {
+        "height_rms": f"{np.std(edge.z):.4g}",
+        "slope_rms": f"{np.sqrt(np.mean(np.gradient(edge.z, edge.x) ** 2)):.4g}",
+    }
+    print("| quantity | ensemble | this edge | read from its picture | 95 % |")
+    print("|---|---|---|---|---|")
     for name in ("height_rms", "corr_length", "slope_rms"):
         one = getattr(found, name)
         print(
-            f"| {name} | {getattr(edge, name):.4g} | {one.value:.4g} ± {one.stderr:.2g} | "
-            f"{one.low:.4g} .. {one.high:.4g} |"
+            f"| {name} | {getattr(edge, name):.4g} | {own.get(name, '')} | "
+            f"{one.value:.4g} ± {one.stderr:.2g} | {one.low:.4g} .. {one.high:.4g} |"
         )
-    print(f"\nheights: {found.gaussianity}")
+    heights = found.gaussianity
+    print(
+        f"\nheights: p = {heights.p_value:.2f} for a Gaussian, skewness "
+        f"{heights.skewness.value:.2f} ± {heights.skewness.stderr:.2f}, excess kurtosis "
+        f"{heights.kurtosis.value:.2f} ± {heights.kurtosis.stderr:.2f}"
+    )
     draw(edge, profile, found, settings["bins"])
 
 

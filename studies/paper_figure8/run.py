@@ -28,7 +28,7 @@ def traced(settings, options):
     view = np.rad2deg(plane.theta_view.values)
     value = plane.brdf_total.values[:, :2, 0]
     error = plane.brdf_total_stderr.values[:, :2, 0]
-    return surface.slope_rms, view, value.T, error.T
+    return surface.facet_slope_rms[0], view, value.T, error.T
 
 
 def with_base(gain, albedo, specular):
