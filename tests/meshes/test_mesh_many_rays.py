@@ -70,7 +70,7 @@ print(*rough.size)
 """
 COMPILE = """
 from pbrdf import GaussianSurface, Material, MeshSurface, Scene, simulate
-rough = GaussianSurface(shape=(24, 24), spacing=0.3, corr_length=3, slope_rms=0.4)
+rough = GaussianSurface(shape=(64, 64), spacing=0.3, corr_length=3, slope_rms=0.4)
 mesh = MeshSurface.of_map(rough.sample(1))
 simulate(Scene(mesh, Material(1.5)), 0.5, n_rays=100_000, n_theta=9, n_dphi=12)
 """
