@@ -70,6 +70,7 @@ class Material:
         )  # fmt: skip
         if not tabulated:
             object.__setattr__(self, "diffuse_albedo", _scalar("diffuse_albedo", albedo))
+        self._check_words()
         bare = (self.n, self.kappa, self.diffuse_albedo) == (1.0, 0.0, 0.0)
         if self.absorbs_all and not bare:
             msg = (
@@ -78,6 +79,16 @@ class Material:
                 "absorber has no interface; leave it out, or the constants."
             )
             raise ValueError(msg)
+
+    def _check_words(self) -> None:
+        """Refuse what is no truth value or no text."""
+        if not isinstance(self.absorbs_all, bool | np.bool_):
+            msg = f"absorbs_all must be true or false, got {self.absorbs_all!r}."
+            raise TypeError(msg)
+        for key, value in (("name", self.name), ("source", self.source)):
+            if not isinstance(value, str | None):
+                msg = f"{key} must be a text or left out, got {value!r}. Put it in quotes."
+                raise TypeError(msg)
 
     @classmethod
     def mirror(cls) -> "Material":
