@@ -88,7 +88,7 @@ class Cluster:
 
 def marks(folder: Path) -> dict[str, int]:
     """When each mark of the store was written. [ns]"""
-    found = (folder / "s.zarr" / "marks").glob("*.json")
+    found = (folder / "s.zarr" / "marks").glob("[0-9]*.json")
     return {mark.name: mark.stat().st_mtime_ns for mark in found}
 
 
@@ -147,7 +147,7 @@ def run(kills: int, seed: int, longest: float = 4.0) -> dict[str, int]:
 
 def _errors(folder: Path) -> list[str]:
     """What the marks of the store say of points that failed."""
-    texts = [m.read_text() for m in (folder / "s.zarr" / "marks").glob("*.json")]
+    texts = [m.read_text() for m in (folder / "s.zarr" / "marks").glob("[0-9]*.json")]
     return [text for text in texts if json.loads(text)["errors"]]
 
 

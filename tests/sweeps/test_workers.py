@@ -106,13 +106,13 @@ def test_a_killed_client_goes_on_where_it_was(serial: Path, tmp_path: Path) -> N
              "-o", str(path), "--workers", "2"],
         )  # fmt: skip
         deadline = time.monotonic() + 300
-        while len(list((path / "marks").glob("*.json"))) < least:
+        while len(list((path / "marks").glob("[0-9]*.json"))) < least:
             assert run.poll() is None, "ended by itself"
             assert time.monotonic() < deadline
             time.sleep(0.01)
         run.send_signal(signal.SIGKILL)
         run.wait()
-    marks = {mark: mark.stat().st_mtime_ns for mark in (path / "marks").glob("*.json")}
+    marks = {mark: mark.stat().st_mtime_ns for mark in (path / "marks").glob("[0-9]*.json")}
     report = run_sweep(load_sweep(tmp_path / "sweep.toml"), path, workers=1)
     assert report.kept == len(marks) >= 9
     assert report.computed == 16 - len(marks)
@@ -179,7 +179,7 @@ def test_a_terminated_sweep_says_what_it_keeps(tmp_path: Path) -> None:
         stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     deadline = time.monotonic() + 300
-    while not list((path / "marks").glob("*.json")):
+    while not list((path / "marks").glob("[0-9]*.json")):
         assert time.monotonic() < deadline
         time.sleep(0.01)
     run.send_signal(signal.SIGTERM)
