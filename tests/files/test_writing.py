@@ -13,18 +13,8 @@ import pytest
 from pbrdf import HeightMap, Scene, load_scene
 from pbrdf.files import complete_file, complete_folder
 from pbrdf.files.writing import ExistsError
+from tests.faults.run import SCENE
 
-SCENE = """
-[surface]
-type = "gaussian"
-shape = [64, 64]
-spacing_um = 1.0
-corr_length_um = 16.0
-slope_rms = 0.2
-
-[substrate]
-n = 1.5
-"""
 RUN = [sys.executable, "-m", "pbrdf", "simulate", "scene.toml", "--n-theta", "9",
        "--n-dphi", "12", "--realizations", "8", "--n-rays", "2000"]  # fmt: skip
 
@@ -167,6 +157,8 @@ def test_twin_runs_have_one_winner(folder):
 
 LIMITED = """
 import resource, sys
+# Bytecode cut short by the limit would be kept and fail later
+sys.dont_write_bytecode = True
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), int(sys.argv[1])))
 from pbrdf.cli import main
 code = main(["--quiet", "init", "scene.toml", "--force"])
@@ -175,6 +167,8 @@ sys.exit(code)
 """
 STORED = """
 import resource, sys
+# Bytecode cut short by the limit would be kept and fail later
+sys.dont_write_bytecode = True
 import numpy as np
 import xarray as xr
 from data_io import write_result
