@@ -129,6 +129,7 @@ def twins(name: str, folder: Path) -> str:
 
 LIMITED = """
 import resource, sys
+sys.dont_write_bytecode = True
 from pbrdf.cli import main
 import data_io, h5netcdf, zarr
 if int(sys.argv[1]):
