@@ -15,6 +15,7 @@ import os
 import tempfile
 import warnings
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,19 @@ _FOLDER = cache_folder()
 _KEPT = _usable(_FOLDER)
 
 
+@cache
+def _place_and_stamp(py_file: str) -> tuple[str, str]:
+    """Folder name of a module's kernels, and the digest of what its file holds."""
+    source = Path(py_file).resolve()
+    stamp = hashlib.sha256(source.read_bytes()).hexdigest()
+    if source.is_relative_to(_ROOT):
+        place = source.relative_to(_ROOT).with_suffix("").as_posix()
+    else:
+        # A kernel of a study or a test: the folder's hash does not cover its file
+        place = "elsewhere-" + hashlib.sha256(str(source).encode()).hexdigest()[:16]
+    return place.replace("/", "."), stamp
+
+
 class ByContent:
     """Tell Numba where a function is kept: by its module and what its file holds.
 
@@ -74,16 +88,8 @@ class ByContent:
     """
 
     def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
-        self._py_file = py_file
         self._line = py_func.__code__.co_firstlineno
-        source = Path(py_file).resolve()
-        self._stamp = hashlib.sha256(source.read_bytes()).hexdigest()
-        if source.is_relative_to(_ROOT):
-            place = source.relative_to(_ROOT).with_suffix("").as_posix()
-        else:
-            # A kernel of a study or a test: the folder's hash does not cover its file
-            place = "elsewhere-" + hashlib.sha256(str(source).encode()).hexdigest()[:16]
-        self.place = place.replace("/", ".")
+        self._place, self._stamp = _place_and_stamp(py_file)
 
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> "ByContent":
@@ -92,7 +98,7 @@ class ByContent:
 
     def get_cache_path(self) -> str:
         """Return the folder of the function's module."""
-        return str(_FOLDER / self.place)
+        return str(_FOLDER / self._place)
 
     def ensure_cache_path(self) -> None:
         """Make that folder."""
@@ -134,7 +140,7 @@ def _let_one_process_compile(kernel: Any) -> None:
     only for those that it calls, and no two call each other, so no two wait for each other.
     """
     function = kernel.py_func
-    place = ByContent(function, function.__code__.co_filename).place
+    place, _ = _place_and_stamp(function.__code__.co_filename)
     lock = FileLock(_FOLDER / f"{place}.{function.__qualname__}.lock", is_singleton=True)
     compile_ = kernel.compile
 
