@@ -8,8 +8,9 @@ import xarray as xr
 
 from pbrdf.derived.elements import Element, element, folded, mueller
 from pbrdf.derived.places import choose, in_words
+from pbrdf.plots.disc import Panel, colour_bar, draw_disc
 from pbrdf.plots.limits import look_of
-from pbrdf.plots.sheet import halo, scene_of, small, title_of, width
+from pbrdf.plots.sheet import scene_of, small, title_of, width
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,7 +22,6 @@ _BINS = ("theta_s", "dphi", "stokes_out", "stokes_in")
 _SHAPE = 0.80
 # Narrowest panel whose labels do not run into each other [in]
 _LEAST = 40.0 / 25.4
-_Panel = tuple[str, str, np.ndarray, np.ndarray | None]
 
 
 def hemisphere(
@@ -107,12 +107,14 @@ def hemisphere(
         )
         figure.suptitle(heading)
         figure.draw_without_rendering()
+        # Laid out; doing it again at each saving takes longer than to draw
+        figure.set_layout_engine("none")
     return figure
 
 
 def _rows(
     here: xr.Dataset, elements: Sequence[str], errors: bool, minus: Hashable | None
-) -> list[list[_Panel]]:
+) -> list[list[Panel]]:
     """Panels (name, title, values, errors), row by row."""
     found = {name: element(here, name) for name in elements}
     if "state" not in mueller(here)[0].dims:
@@ -160,7 +162,7 @@ def _difference(one: Element, base: Element) -> Element:
     return Element((one.value - base.value).assign_attrs(one.value.attrs), error)
 
 
-def _panel(name: str, title: str, one: Element) -> _Panel:
+def _panel(name: str, title: str, one: Element) -> Panel:
     value = one.value.transpose("theta_s", "dphi").values
     error = None if one.stderr is None else one.stderr.transpose("theta_s", "dphi").values
     if one.value.attrs.get("units") == "rad":
@@ -170,7 +172,7 @@ def _panel(name: str, title: str, one: Element) -> _Panel:
     return name, f"{title} [{unit}]", value, error
 
 
-def _error_panel(name: str, title: str, one: Element) -> _Panel:
+def _error_panel(name: str, title: str, one: Element) -> Panel:
     if one.stderr is None:
         msg = f"the result holds no errors of {name}. Leave errors out."
         raise ValueError(msg)
@@ -180,7 +182,7 @@ def _error_panel(name: str, title: str, one: Element) -> _Panel:
 
 
 def _drawn(
-    here: xr.Dataset, rows: list[list[_Panel]], columns: int, inches: float, scale: str
+    here: xr.Dataset, rows: list[list[Panel]], columns: int, inches: float, scale: str
 ) -> "Figure":
     from matplotlib.figure import Figure
 
@@ -189,23 +191,36 @@ def _drawn(
         figsize=(inches, side / _SHAPE * len(rows) + 0.55), layout="constrained"
     )
     shared = _shared_looks(rows, scale)
+    incidence = float(np.rad2deg(here.theta_i))
     for number, row in enumerate(rows):
         offset = (
             columns - len(row) if len(rows) > 1 and number and len(row) < columns else 0
         )
         offset = offset if row[0][0] == "difference" else 0
+        axes, images = [], []
         for place, (panel, look) in enumerate(zip(row, shared[number], strict=True)):
             at = number * columns + place + offset + 1
             axis = figure.add_subplot(len(rows), columns, at, projection="polar")
-            _draw(figure, axis, here, panel, look)
+            images.append(draw_disc(axis, panel, look, incidence))
+            axes.append(axis)
+        if _alike(row):
+            colour_bar(figure, axes, images[0], shared[number][0])
+        else:
+            for axis, image, look in zip(axes, images, shared[number], strict=True):
+                colour_bar(figure, [axis], image, look)
     return figure
 
 
-def _shared_looks(rows: list[list[_Panel]], scale: str) -> list[list[Any]]:
+def _alike(row: list[Panel]) -> bool:
+    """Whether the panels of a row show one element, on one scale."""
+    return len(row) > 1 and len({name for name, *_ in row}) == 1
+
+
+def _shared_looks(rows: list[list[Panel]], scale: str) -> list[list[Any]]:
     """Panels of a row that show one element share limits and colours."""
     looks = []
     for row in rows:
-        if len({name for name, *_ in row}) > 1 or len(row) == 1:
+        if not _alike(row):
             looks.append([look_of(n, v, e, scale) for n, _, v, e in row])
             continue
         values = np.stack([v for _, _, v, _ in row])
@@ -213,105 +228,3 @@ def _shared_looks(rows: list[list[_Panel]], scale: str) -> list[list[Any]]:
         error = np.stack(kept) if len(kept) == len(row) else None
         looks.append([look_of(row[0][0], values, error, scale)] * len(row))
     return looks
-
-
-def _draw(figure: "Figure", axis: Any, here: xr.Dataset, panel: _Panel, look: Any) -> None:
-    """Draw one hemisphere, its marks, labels and colour bar."""
-    name, title, values, error = panel
-    norm, colours, bar_options = look
-    n_theta, n_dphi = values.shape
-    zenith = np.linspace(0.0, 90.0, n_theta + 1)
-    # Bins are centred on dphi = 0, which is drawn to the left
-    azimuth = (np.arange(n_dphi + 1) - 0.5) * 2 * np.pi / n_dphi + np.pi
-    axis.set_facecolor("0.85")
-    axis.grid(visible=False)
-    image = axis.pcolormesh(
-        azimuth, zenith, np.ma.masked_invalid(values), norm=norm, cmap=colours,
-        rasterized=True,
-    )  # fmt: skip
-    if error is not None and name != "AOLP":
-        unsure = np.isfinite(values) & ~(np.abs(values) >= 2 * error)
-    elif error is not None:
-        unsure = np.isfinite(values) & ~(error < 15.0)
-    else:
-        unsure = np.zeros(values.shape, bool)
-    if unsure.any():
-        _hatch(axis, azimuth, zenith, unsure)
-    axis.set_ylim(0.0, 90.0)
-    axis.set_yticks([30, 60, 90], labels=[])
-    axis.set_xticks(np.deg2rad([0, 90, 180, 270]), labels=["180°", "270°", "0°", "90°"])
-    axis.tick_params(axis="x", pad=-1.5)
-    axis.grid(visible=True, color="white", linewidth=0.9, alpha=0.7)
-    for ring in (30, 60):
-        axis.plot(
-            np.linspace(0, 2 * np.pi, 181), np.full(181, ring), color="black",
-            linewidth=0.35, zorder=3,
-        )  # fmt: skip
-        axis.text(
-            np.deg2rad(68), ring, f"{ring}°", ha="center", va="center", zorder=6,
-            path_effects=halo(),
-        )  # fmt: skip
-    zenith_i = float(np.rad2deg(here.theta_i))
-    axis.plot(
-        np.pi, zenith_i, "*", color="black", markersize=5.5, zorder=7,
-        path_effects=halo(), clip_on=False,
-    )  # fmt: skip
-    axis.plot(
-        0.0, zenith_i, "+", color="black", markersize=6, mew=1.1, zorder=7,
-        path_effects=halo(), clip_on=False,
-    )  # fmt: skip
-    axis.set_title(title, pad=3)
-    bar = figure.colorbar(
-        image, ax=axis, location="bottom", shrink=0.86, aspect=22, pad=0.03, **bar_options
-    )
-    bar.outline.set_linewidth(0.4)
-    _few_ticks(bar, norm, "ticks" in bar_options and name != "AOLP")
-
-
-def _hatch(axis: Any, azimuth: np.ndarray, zenith: np.ndarray, cells: np.ndarray) -> None:
-    """Hatch some cells of the hemisphere."""
-    from matplotlib.collections import PolyCollection
-
-    ring, sector = np.nonzero(cells)
-    corners = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    outline = np.stack(
-        [
-            np.stack([azimuth[sector + across], zenith[ring + out]], axis=-1)
-            for out, across in corners
-        ],
-        axis=1,
-    )
-    axis.add_collection(
-        PolyCollection(
-            list(outline), facecolor="none", edgecolor="0.35", linewidth=0,
-            hatch="//////", zorder=2,
-        )
-    )  # fmt: skip
-
-
-def _few_ticks(bar: Any, norm: Any, symmetric: bool) -> None:
-    """Keep as many ticks as fit below a panel of a journal's column."""
-    from matplotlib.colors import LogNorm
-    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
-
-    def power(value: float, _: object) -> str:
-        if value == 0:
-            return "0"
-        exponent = int(np.round(np.log10(abs(value))))
-        return f"${'-' if value < 0 else ''}10^{{{exponent}}}$"
-
-    if symmetric:
-        positive = [t for t in bar.get_ticks() if t >= norm.linthresh][-1:]
-        kept = sorted({0.0, *positive, *([-t for t in positive] if norm.vmin < 0 else [])})
-        bar.set_ticks(kept)
-        bar.formatter = FuncFormatter(power)
-        bar.update_ticks()
-    elif isinstance(norm, LogNorm):
-        bar.locator = LogLocator(numticks=3)
-        bar.formatter = FuncFormatter(power)
-        bar.update_ticks()
-    elif norm.vmax != 90.0:
-        bar.locator = MaxNLocator(3)
-        bar.update_ticks()
-        bar.formatter.set_powerlimits((-3, 4))
-    bar.ax.xaxis.set_minor_locator(NullLocator())

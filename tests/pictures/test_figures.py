@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.patches import PathPatch
 from numpy.testing import assert_allclose
 
 from data_io import write_result
@@ -59,11 +60,34 @@ def test_uncertain_cells_are_hatched_and_unknown_ones_left_out():
     result.brdf_total_stderr[3, 5, 0, 0] = 9.0
     result.brdf_total[2, 2] = np.nan
     figure = hemisphere(result, ("M00",))
-    colours, hatched = figure.axes[0].collections[:2]
-    assert np.ma.getmaskarray(colours.get_array())[2, 2]
-    assert colours.get_array().mask.sum() == 1
-    assert hatched.get_hatch()
-    assert len(hatched.get_paths()) == 1
+    axis = figure.axes[0]
+    assert axis.collections[0].get_array().mask.sum() == 1
+    (outline,) = [patch for patch in axis.findobj(PathPatch) if patch.get_hatch()]
+    # The dark cell and no other: dphi = 0 is drawn to the left, half a bin each side
+    shape = result.brdf_total.shape[:2]
+    inside = [
+        outline.get_path().contains_point(
+            (np.pi + dphi * 2 * np.pi / shape[1], (theta + 0.5) * 90 / shape[0])
+        )
+        for theta, dphi in np.ndindex(shape)
+    ]
+    assert list(np.flatnonzero(inside)) == [3 * shape[1] + 5]
+
+
+def test_states_of_one_element_share_a_colour_bar():
+    two = hand_made().isel(wavelength=0, theta_i=0)
+    states = xr.concat(
+        [two, 1.5 * two], xr.DataArray(["dry", "90 deg"], dims="state", name="state"),
+        data_vars="all",
+    )  # fmt: skip
+    figure = hemisphere(states, ("M00", "M10"), minus="dry")
+    polar = [axis for axis in figure.axes if axis.name == "polar"]
+    assert len(polar) == 6
+    # One for both states, one for the difference, of each element
+    assert len(figure.axes) - len(polar) == 4
+    for dry, wet in ((polar[0], polar[1]), (polar[3], polar[4])):
+        limits = [axis.collections[0].get_clim() for axis in (dry, wet)]
+        assert limits[0] == limits[1]
 
 
 def test_printed_letters_keep_their_size(tmp_path):
