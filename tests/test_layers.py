@@ -21,6 +21,7 @@ KERNEL_IMPORTS = {
     "cmath",
     "collections",
     "filelock",  # one process compiles a kernel
+    "functools",  # a file is hashed once
     "hashlib",
     "math",
     "numba",
