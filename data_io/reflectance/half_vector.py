@@ -1,37 +1,28 @@
-"""Half-vector angles of a BRDF table: directions and frames, nodes, and its accuracy.
+"""Half-vector angles of a BRDF table: directions, frames and nodes.
 
 With L to the light, E to the viewer, n the normal and h the half vector: theta_h is the
 angle from n to h, theta_d the angle from h to L, and phi_d the azimuth of L about h,
 counted from t = b x h towards b = n x h. Both beams have their s axis along L x E.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from data_io.goniometer.frames import rotation
 from data_io.reflectance.brdf_source import Brdf
 
 # Cells below the horizon take the value at this zenith, since NaN would spread
-_LAST_ZENITH = np.radians(89.5)
-# Directions further down are left out where accuracy is judged
+LAST_ZENITH = np.radians(89.5)
+# Nodes do not follow what M00 does further down, and accuracy there is a class of its own
 _JUDGED = np.radians(85.0)
 # Part of M00 that linear interpolation along one axis may miss between two nodes, and the
 # part of the peak below which M00 counts as the floor for it
-_MISSED, _FLOOR = 0.004, 0.01
+_MISSED, _FLOOR = 0.003, 0.01
 # Places along an axis at which the curvature is asked for
 _FINE = 1501
 # Least and most nodes of phi_d, theta_d, theta_h, and most in all
 _LEAST, _MOST, _MOST_NODES = (25, 24, 24), (181, 121, 161), 500_000
-# Brightness classes, as parts of the peak of M00
-CLASSES = {
-    "above 10 %": (0.1, np.inf),
-    "1 to 10 %": (0.01, 0.1),
-    "0.1 to 1 %": (1e-3, 0.01),
-}
-QUANTILES = {"median": 0.5, "p95": 0.95, "worst": 1.0}
 
 
 class HalfVectorGrid(NamedTuple):
@@ -77,6 +68,20 @@ def zeniths(geometry: Geometry) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return theta_i, theta_s, np.mod(phi_s - phi_i, 2 * np.pi)
 
 
+def half_angles(to_light: np.ndarray, to_viewer: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return phi_d, theta_d and theta_h of directions (..., 3) of an isotropic surface."""
+    middle = to_light + to_viewer
+    h = middle / np.linalg.norm(middle, axis=-1, keepdims=True)
+    theta_h = np.arctan2(np.hypot(h[..., 0], h[..., 1]), h[..., 2])
+    theta_d = np.arccos(np.clip(np.sum(h * to_light, axis=-1), -1.0, 1.0))
+    # b = n x h and t = b x h', in the plane of h and the normal
+    b = np.stack([-h[..., 1], h[..., 0], np.zeros_like(theta_h)], axis=-1)
+    b /= np.maximum(np.linalg.norm(b, axis=-1, keepdims=True), 1e-300)
+    t = np.cross(b, h)
+    phi_d = np.arctan2(np.sum(b * to_light, axis=-1), np.sum(t * to_light, axis=-1))
+    return phi_d, theta_d, theta_h
+
+
 def file_frames(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
     """Return rotations from the meridian frames of both beams into those of the file.
 
@@ -111,10 +116,10 @@ def tabulate(brdf: Brdf, grid: HalfVectorGrid) -> np.ndarray:
 def _above_horizon(geometry: Geometry) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return theta_i, theta_s and dphi, zeniths below the horizon lifted above it. [rad]"""
     theta_i, theta_s, dphi = zeniths(geometry)
-    return np.minimum(theta_i, _LAST_ZENITH), np.minimum(theta_s, _LAST_ZENITH), dphi
+    return np.minimum(theta_i, LAST_ZENITH), np.minimum(theta_s, LAST_ZENITH), dphi
 
 
-def _judged(geometry: Geometry) -> np.ndarray:
+def judged(geometry: Geometry) -> np.ndarray:
     """Tell which directions are far enough above the horizon to be judged."""
     theta_i, theta_s, _ = zeniths(geometry)
     return np.maximum(theta_i, theta_s) < _JUDGED
@@ -141,7 +146,7 @@ def adapted_grid(brdf: Brdf, bins: tuple[int, int] | None) -> HalfVectorGrid:
         """M00 with the wavelength last, NaN near and below the horizon."""
         geometry = half_vector_geometry(phi_d, theta_d, theta_h)
         values = np.moveaxis(brdf(*_above_horizon(geometry))[..., 0, 0], 0, -1)
-        return np.where(_judged(geometry)[..., None], values, np.nan)
+        return np.where(judged(geometry)[..., None], values, np.nan)
 
     n_theta, n_phi = (_FINE, _FINE) if bins is None else (2 * bins[0], bins[1])
     share = np.linspace(0.0, 1.0, n_theta)
@@ -153,7 +158,8 @@ def adapted_grid(brdf: Brdf, bins: tuple[int, int] | None) -> HalfVectorGrid:
     # Where the lobe has fallen to parts of its peak
     parts = (0.97, 0.7, 0.4, 0.15, 0.04, 0.012)
     heights = [theta_h[np.flatnonzero(lobe >= part * peak)[-1]] for part in parts]
-    across = np.minimum(heights, np.radians(80.0))
+    # The smallest ones let theta_d go as far as zeniths are judged
+    across = np.minimum([*np.radians([0.5, 2.0, 5.0, 10.0]), *heights], np.radians(80.0))
     inner = np.radians([1.0, 15.0, 30.0, 45.0, 60.0, 70.0, 78.0])
     around = np.radians([0.0, 30.0, 60.0, 90.0, 135.0, 180.0])
     samples = (
@@ -193,70 +199,3 @@ def _nodes(x: np.ndarray, density: np.ndarray, count: int) -> np.ndarray:
     steps = 0.5 * (density[1:] + density[:-1]) * np.diff(x)
     passed = np.concatenate([[0.0], np.cumsum(steps)])
     return np.interp(np.linspace(0.0, passed[-1], count), passed, x)
-
-
-def accuracy(
-    brdf: Brdf,
-    grid: HalfVectorGrid,
-    table: Callable[[np.ndarray], np.ndarray],
-    directions: int = 20_000,
-) -> xr.Dataset:
-    """Compare a table between its nodes with its source, at random directions.
-
-    Parameters
-    ----------
-    brdf : callable
-        The source.
-    grid : HalfVectorGrid
-        Nodes of the table; directions are as close as they are.
-    table : callable
-        Points (N, 3) in phi_d, theta_d, theta_h -> matrices (N, wavelength, 4, 4).
-    directions : int
-        How many to try; those below 85 degrees of zenith count.
-
-    Returns
-    -------
-    xarray.Dataset
-        `error` (brightness, quantile, stokes_out, stokes_in), parts of M00 by which an
-        element differs, and the `count` of directions in each class of brightness.
-    """
-    rng = np.random.default_rng(0)
-    shares = rng.random((3, directions))
-    # Half evenly over the nodes, so that a narrow lobe is met, half over the angles
-    even = np.arange(directions) % 2 == 0
-    points = [
-        np.where(even, axis[0] + share * np.ptp(axis),
-                 np.interp(share * (axis.size - 1), np.arange(axis.size), axis))
-        for axis, share in zip(grid, shares, strict=True)
-    ]  # fmt: skip
-    geometry = half_vector_geometry(*points)
-    seen = _judged(geometry)
-    geometry = Geometry(*(one[seen] for one in geometry))
-    expected = np.moveaxis(mueller_at(brdf, geometry), 0, 1)
-    found = table(np.stack(points, axis=-1)[seen])
-    scale = expected[..., :1, :1]
-    # Directions and wavelengths count alike
-    error = (np.abs(found - expected) / np.maximum(scale, 1e-300)).reshape(-1, 4, 4)
-    m00 = expected[..., 0, 0].ravel()
-    peak = float(m00.max())
-    errors, counts = [], []
-    for low, high in CLASSES.values():
-        here = error[(m00 >= low * peak) & (m00 < high * peak)]
-        counts.append(len(here))
-        none = np.full((len(QUANTILES), 4, 4), np.nan)
-        errors.append(
-            np.quantile(here, list(QUANTILES.values()), axis=0) if len(here) else none
-        )
-    stokes = list("IQUV")
-    return xr.Dataset(
-        {
-            "error": (
-                ("brightness", "quantile", "stokes_out", "stokes_in"), np.array(errors),
-                {"units": "1", "long_name": "difference from the source, part of its M00"},
-            ),
-            "count": ("brightness", counts),
-        },
-        {"brightness": list(CLASSES), "quantile": list(QUANTILES),
-         "stokes_out": stokes, "stokes_in": stokes},
-        {"peak_M00": peak, "nodes": [axis.size for axis in grid]},
-    )  # fmt: skip

@@ -16,13 +16,9 @@ import numpy.typing as npt
 import xarray as xr
 
 from data_io.reflectance.brdf_source import from_dataset, from_model
-from data_io.reflectance.half_vector import (
-    HalfVectorGrid,
-    accuracy,
-    adapted_grid,
-    tabulate,
-)
+from data_io.reflectance.half_vector import HalfVectorGrid, adapted_grid, tabulate
 from data_io.reflectance.pbsdf import tensor_fields
+from data_io.reflectance.table_accuracy import GRAZING, accuracy
 from pbrdf.analytic import MicrofacetModel
 from pbrdf.errors import AccuracyWarning, real_array, require
 from pbrdf.files import complete_file
@@ -134,10 +130,11 @@ def _summary(found: xr.Dataset) -> dict[str, Any]:
                 str(label): None if np.isnan(value) else round(float(value), 6)
                 for label, value in zip(one["quantile"].values, one.values, strict=True)
             }
-        classes[f"M00 {name} of its peak"] = {"directions": int(here["count"])} | elements
+        what = f"M00 {name} of its peak" if name != GRAZING else f"zeniths {name}"
+        classes[what] = {"directions": int(here["count"])} | elements
     return {
         "what": "difference of the file, read back between its nodes, from its source, in "
-        "parts of M00 there; zeniths up to 85 degrees",
+        "parts of M00 there; zeniths beyond 85 degrees are a class of their own",
         "peak_M00_per_sr": found.attrs["peak_M00"],
         "nodes_phi_d_theta_d_theta_h": found.attrs["nodes"],
         "error": classes,

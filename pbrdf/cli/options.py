@@ -345,8 +345,11 @@ def numbers(text: str, option: str) -> list[float]:
     Raises
     ------
     ValueError
-        If a word is no number.
+        If a word is no number, or there is none.
     """
+    if not names(text):
+        msg = f"{option} must be numbers separated by commas, got {text!r}."
+        raise ValueError(msg)
     found = []
     for word in names(text):
         try:

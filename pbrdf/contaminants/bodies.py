@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pbrdf.contaminants.ground import Ground
 from pbrdf.contaminants.shapes import Shape
@@ -14,6 +15,8 @@ from pbrdf.surface.heightmap import HeightMap
 
 # How far below the lowest point of the surface a body still counts, relative to its height
 BELOW = 1e-6
+# Relative to their size, what two bodies that are the same may differ by
+SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +178,13 @@ def _assemble(
         for name in "xyz"
     )
     x, y = ground.wrapped(np.column_stack([x, y])).T.copy()
+    material = np.concatenate(
+        [np.empty(0, np.int64)]
+        + [np.full(len(here.x), index, np.int64) for index, here in settled]
+    )
+    rules = _not_filled_before(ground, shapes, np.column_stack([x, y, z]))
+    shapes = [shape for shape, kept in zip(shapes, rules, strict=True) if kept]
+    x, y, z, material = x[rules], y[rules], z[rules], material[rules]
     # What lies below the surface everywhere is of no concern
     floor = ground.lowest - z
     cut = [
@@ -197,12 +207,36 @@ def _assemble(
         radius=radius,
         z_low=z + np.array(cut),
         z_high=z + np.array([shape.height for shape in shapes]),
-        material=np.concatenate(
-            [np.empty(0, np.int64)]
-            + [np.full(len(here.x), index, np.int64) for index, here in settled]
-        ),
+        material=material,
         materials=materials,
     )
+
+
+def _not_filled_before(
+    ground: Ground, shapes: Sequence[Shape], place: np.ndarray
+) -> np.ndarray:
+    """Which bodies are not the very same as one before, which rules all that they hold.
+
+    A beam would meet both surfaces at one point, in the order of rounding.
+    """
+    kept = np.ones(len(shapes), dtype=bool)
+    if len(shapes) < 2:
+        return kept
+    period = (*ground.surface.size, 0.0) if ground.surface.periodic else None
+    heights = np.array([shape.height for shape in shapes])
+    tree = cKDTree(
+        np.where(place == period, 0.0, place) if period else place, boxsize=period
+    )
+    for one, other in sorted(tree.query_pairs(SAME * heights.max())):
+        near, far = shapes[one].slabs, shapes[other].slabs
+        if kept[one] and near.shape == far.shape:
+            apart = place[one] - place[other]
+            apart[:2] = ground.nearest(apart[:2])
+            close = SAME * heights[one]
+            kept[other] &= not (
+                np.abs(apart).max() <= close and np.allclose(near, far, SAME, close)
+            )
+    return kept
 
 
 def _check_extent(ground: Ground, x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> None:

@@ -11,7 +11,13 @@ from pbrdf.contaminants.films import Film
 from pbrdf.contaminants.spheres import Spheres
 from pbrdf.errors import DataFileError
 from pbrdf.optics.materials import Material
-from pbrdf.scene.toml_tables import check_keys, check_present, kind_of, material_table
+from pbrdf.scene.toml_tables import (
+    check_keys,
+    check_numbers,
+    check_present,
+    kind_of,
+    material_table,
+)
 from pbrdf.scene.toml_tables import read_material as read_material_table
 
 PLACE = "contaminants"
@@ -87,18 +93,17 @@ def read_contaminant(table: Mapping[str, Any], source: Path) -> Drops | Spheres 
     kind = kind_of(table, KINDS, PLACE, source)
     check_keys(table, contaminant_keys(kind), f"{PLACE} {kind}", source)
     check_present(table, _NEEDED[kind], f"{PLACE} {kind}", source)
-    given: dict[str, Any] = {
-        name: _from_file(key, table[key], unit, source)
-        for key, (name, unit) in _KEYS[kind].items()
-        if key in table
-    }
-    given |= {name: table[name] for name in _WORDS[kind] if name in table}
+    check_numbers(table, _KEYS[kind], f"{PLACE} {kind}", source)
+    given: dict[str, Any] = {name: table[name] for name in _WORDS[kind] if name in table}
     material = table.get("material")
     if isinstance(material, dict):
         given["material"] = read_material_table(material, f"{PLACE}.material", source)
     elif material is not None:
         given["material"] = material
     try:
+        for key, (name, unit) in _KEYS[kind].items():
+            if key in table:
+                given[name] = _from_file(key, table[key], unit)
         return KINDS[kind](**given)
     except (TypeError, ValueError) as error:
         problem = f"[{PLACE} {kind}]: {str(error).rstrip('.')}"
@@ -121,14 +126,11 @@ def _in_file(value: Any, unit: float) -> Any:
     return short if short * unit == value else float(value / unit)
 
 
-def _from_file(key: str, value: Any, unit: float, source: Path) -> Any:
+def _from_file(key: str, value: Any, unit: float) -> Any:
     """Return numbers in the unit of the field."""
     try:
         numbers = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise DataFileError(
-            source, f"[{PLACE}]: {key!r} is {value!r}", "Write numbers."
-        ) from error
-    if isinstance(value, bool):
-        raise DataFileError(source, f"[{PLACE}]: {key!r} is {value!r}", "Write a number.")
+    except ValueError:
+        msg = f"{key!r} is {value!r}, of rows that differ in length."
+        raise ValueError(msg) from None
     return numbers * unit if numbers.ndim else float(numbers) * unit

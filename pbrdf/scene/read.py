@@ -14,6 +14,7 @@ from pbrdf.scene.scene import Scene
 from pbrdf.scene.toml_tables import (
     MATERIAL_KEYS,
     check_keys,
+    check_numbers,
     check_present,
     kind_of,
     read_material,
@@ -31,6 +32,8 @@ SURFACE_KEYS = {
         "lags", "autocorrelation", "quantiles",
     },
 }  # fmt: skip
+# Words and switches; all else is numbers
+_WORDS = {"file", "periodic", "unit"}
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -75,6 +78,7 @@ def scene_of(document: Mapping[str, Any], source: Path) -> Scene:
 def _read_surface(table: dict[str, Any], source: Path) -> Surface:
     kind = kind_of(table, SURFACE_KEYS, "surface", source)
     check_keys(table, SURFACE_KEYS[kind], "surface", source)
+    check_numbers(table, SURFACE_KEYS[kind] - _WORDS, "surface", source)
     if kind == "flat":
         return HeightMap.flat(size=_pair(table.get("size_um", 1.0)))
     if kind == "mesh":

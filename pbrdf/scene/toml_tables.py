@@ -1,9 +1,11 @@
 """Tables of TOML files: keys that are known, values of the right kind, materials."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from pbrdf.errors import DataFileError
 from pbrdf.files import companion
@@ -14,16 +16,9 @@ from pbrdf.optics.published import read, read_constant
 from pbrdf.optics.published.formulas import Formula
 from pbrdf.optics.published.package import PREFIX, Entry
 
-MATERIAL_KEYS = {
-    "material",
-    "n",
-    "kappa",
-    "diffuse_albedo",
-    "wavelength_um",
-    "name",
-    "file",
-    "absorbs_all",
-}
+CONSTANTS = ("n", "kappa", "diffuse_albedo")
+_OF_A_CONSTANT = ("wavelength_um", "values", "formula", "coefficients", "range_um")
+MATERIAL_KEYS = {"material", *CONSTANTS, "wavelength_um", "name", "file", "absorbs_all"}
 
 
 def required(document: Mapping[str, Any], name: str, source: Path) -> dict[str, Any]:
@@ -54,6 +49,29 @@ def check_present(
     for key in keys:
         if key not in table:
             raise DataFileError(source, f"[{place}]: key {key!r} is missing", "Give it.")
+
+
+def check_numbers(
+    table: Mapping[str, Any], keys: Iterable[str], place: str, source: Path
+) -> None:
+    """Refuse values of these keys that are no numbers, nor lists of numbers."""
+    for key in keys:
+        for value in _leaves(table.get(key, [])):
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                word = str(value).lower() if isinstance(value, bool) else repr(value)
+                raise DataFileError(
+                    source, f"[{place}]: {key!r} holds {word}",
+                    "Write a number, or a list of numbers.",
+                )  # fmt: skip
+
+
+def _leaves(value: Any) -> Iterator[Any]:
+    """Yield what lists hold, however deep."""
+    if not isinstance(value, list):
+        yield value
+        return
+    for one in value:
+        yield from _leaves(one)
 
 
 def kind_of(table: dict[str, Any], known: Iterable[str], place: str, source: Path) -> str:
@@ -117,14 +135,30 @@ def _constant_table(key: str, constant: Any) -> Any:
 
 def _read_constant(key: str, value: Any, place: str, source: Path) -> Any:
     """Read a constant: a number, a list, a table of its own, a file or a formula."""
-    if not isinstance(value, dict):
+    if key == "name":
         return value
+    if not isinstance(value, dict):
+        check_numbers({key: value}, (key,), place, source)
+        return value
+    check_numbers(value, _OF_A_CONSTANT, f"{place}.{key}", source)
+    try:
+        return _of_table(key, value, place, source)
+    except (TypeError, ValueError, IndexError) as error:
+        problem = f"[{place}.{key}]: {str(error).rstrip('.')}"
+        raise DataFileError(source, problem, "See the documented keys.") from error
+
+
+def _of_table(key: str, value: dict[str, Any], place: str, source: Path) -> Any:
+    """Read a constant from a table of its own."""
     if value.keys() == {"file"}:
         where = f"[{place}] {key}"
         return read_constant(_constants_file(value["file"], where, source), key)
     if value.keys() == {"wavelength_um", "values"}:
         return Table.of(key, value["wavelength_um"], value["values"])
     if key == "n" and value.keys() == {"formula", "coefficients", "range_um"}:
+        if np.shape(value["range_um"]) != (2,):
+            msg = f"range_um must be two wavelengths, got {value['range_um']}."
+            raise ValueError(msg)
         low, high = value["range_um"]
         return Formula(value["formula"], tuple(value["coefficients"]), (low, high))
     known = "wavelength_um and values, or file"
@@ -148,13 +182,27 @@ def read_material(table: Mapping[str, Any], place: str, source: Path) -> Materia
         return _material_of_file(table, place, source)
     if "n" not in table:
         raise DataFileError(source, f"[{place}]: key 'n' is missing", "Or give 'material'.")
-    wavelength = table.pop("wavelength_um", None)
-    for key in ("n", "kappa", "diffuse_albedo"):
+    for key in CONSTANTS:
         if key in table:
             table[key] = _read_constant(key, table[key], place, source)
-    if wavelength is None:
-        return Material(**table)
-    return Material.from_table(wavelength=wavelength, **table)
+    listed = [key for key in CONSTANTS if isinstance(table.get(key), list)]
+    if bool(listed) != ("wavelength_um" in table):
+        problem = (
+            f"{', '.join(map(repr, listed))} without" if listed else "nothing listed by"
+        )
+        raise DataFileError(
+            source, f"[{place}]: {problem} 'wavelength_um'",
+            "Write one of n, kappa, diffuse_albedo as a list beside wavelength_um, a value "
+            "for each wavelength, or numbers without it.",
+        )  # fmt: skip
+    check_numbers(table, ("wavelength_um",), place, source)
+    try:
+        if not listed:
+            return Material(**table)
+        return Material.from_table(wavelength=table.pop("wavelength_um"), **table)
+    except (TypeError, ValueError) as error:
+        problem = f"[{place}]: {str(error).rstrip('.')}"
+        raise DataFileError(source, problem, "See the documented keys.") from error
 
 
 def _material_of_file(table: Mapping[str, Any], place: str, source: Path) -> Material:

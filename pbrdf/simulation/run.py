@@ -199,11 +199,16 @@ class Ready:
         return replace(self, run=run, plans=plans, single=single)
 
 
+# Arguments that are on or off
+SWITCHES = ("variance_reduction", "explain")
+
+
 def prepared(*, whole: bool = True, **given: Any) -> Ready:
     """Check and plan a run, by the arguments of `simulate`; `whole` if all is kept."""
     scene, theta_i, wave = given["scene"], given["theta_i"], given["wave"]
     n_rays, realizations = given["n_rays"], given["realizations"]
-    target, light = given["target_rel_error"], given["variance_reduction"]
+    target = given["target_rel_error"]
+    light, _ = (arguments.switch(name, given[name]) for name in SWITCHES)
     root = arguments.seed_sequence(given["seed"])
     size = asked_size(theta_i, **{name: given[name] for name in OF_SIZE})
     if whole:
@@ -356,8 +361,8 @@ def _judge_contaminants(
     """Judge what lies on the surface, known only after laying it."""
     if waves is None or not scene.contaminants:
         return Judgement()
-    indices = [material_of(one.material).indices(waves) for one in scene.contaminants]
-    return judge_contaminants(moments.reports, waves, indices)
+    coverings = [material_of(one.material) for one in scene.contaminants]
+    return judge_contaminants(moments.reports, waves, coverings, scene.materials)
 
 
 def _missing_light(moments: Sequence[Moments]) -> list[str]:

@@ -102,6 +102,7 @@ def run_sweep(
             else:
                 with in_process(min(cores, len(left))) as own:
                     by_client(own, sweep, store, left, report, told, cores=cores)
+    store.tell_warnings()
     return report
 
 

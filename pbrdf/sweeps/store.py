@@ -7,6 +7,7 @@ where the data are not those it speaks of, a group counts as not computed.
 import json
 import shutil
 import warnings
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from filelock import FileLock
 
 from pbrdf.files import complete_file, complete_folder
 from pbrdf.files.writing import ExistsError
@@ -115,6 +117,23 @@ class Store:
             if mark is not None:
                 yield group, mark
 
+    def tell_warnings(self) -> None:
+        """Write what all marks warn of into the attributes of the store.
+
+        Parts of one sweep may end together: one writes at a time, and the last knows all.
+        """
+        root = self.path / "zarr.json"
+        with FileLock(self.path / _MARKS / ".lock"):
+            counted: Counter[str] = Counter()
+            for _, mark in self.marks():
+                counted.update(mark.warnings)
+            told = [f"{text} ({count} runs)" for text, count in sorted(counted.items())]
+            metadata = json.loads(root.read_text(encoding="utf-8"))
+            if metadata["attributes"].get("warnings") != told:
+                metadata["attributes"]["warnings"] = told
+                with complete_file(root) as stage:
+                    stage.write_text(json.dumps(metadata, indent=2), encoding="utf-8")
+
     def _mark_file(self, group: int) -> Path:
         return self.path / _MARKS / f"{group}.json"
 
@@ -188,6 +207,7 @@ def _make(folder: Path, sweep: Sweep, layout: Layout) -> None:
         "design": sweep.design.kind,
         "sweep": json.dumps(sweep.document, default=str),
         "source": sweep.source.name,
+        "warnings": [],
     }
     root = zarr.open_group(folder, mode="w", zarr_format=3, attributes=attributes)
     packed = [zarr.codecs.ZstdCodec(level=3, checksum=True)]

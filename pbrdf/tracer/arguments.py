@@ -120,6 +120,16 @@ def count(name: str, value: int, least: int) -> int:
     return int(number)
 
 
+def switch(name: str, value: bool) -> bool:
+    """Return what is on or off."""
+    if not isinstance(value, bool | np.bool_):
+        msg = (
+            f"{name} must be True or False, got {value!r}. It switches one thing on or off."
+        )
+        raise TypeError(msg)
+    return bool(value)
+
+
 def even_count(name: str, value: int) -> int:
     """Return a whole number that is even."""
     number = count(name, value, 2)
@@ -248,6 +258,7 @@ def one_of(name: str, value: str, known: Iterable[str]) -> str:
 
 def mirrored(fold: bool, scene: Scene, phi_i: npt.ArrayLike | str) -> bool:
     """Return `fold`, refused where the mean is not its own mirror image."""
+    fold = switch("fold", fold)
     symmetric = (
         isinstance(phi_i, str)
         and isotropic(scene.surface)

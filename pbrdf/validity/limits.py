@@ -86,17 +86,7 @@ theta_i is 23 with a typical radius of curvature R of 42.9 um, and should be abo
     if rough.slope_rms <= FLAT:
         return Judgement(numbers=numbers)
 
-    notes = []
-    # Flat parts mirror in the tracer too
-    missed = share - rough.flat
-    if missed.max() > MOST_COHERENT:
-        a, w = np.unravel_index(np.argmax(missed), missed.shape)
-        notes.append(
-            f"{100 * missed[a, w]:.2g} % of the light stays in a coherent specular beam at "
-            f"{_place(theta[a], waves[w])} (rms height {rough.height_rms:.3g} um), which "
-            "geometric optics spreads over the lobe"
-            f"{_others(missed > MOST_COHERENT)}."
-        )
+    notes = _of_beam(rough, share, theta, waves)
     if curvature.min() < LEAST_CURVATURE:
         a, w = np.unravel_index(np.argmin(curvature), curvature.shape)
         size = 100 / curvature[a, w]
@@ -119,6 +109,40 @@ theta_i is 23 with a typical radius of curvature R of 42.9 um, and should be abo
         said = remarks if rough.facets else notes
         said.append(_between_nodes(rough, waves[np.argmax(cell)]))
     return Judgement(numbers=numbers, notes=tuple(notes), remarks=tuple(remarks))
+
+
+def _of_beam(
+    rough: Roughness, share: np.ndarray, theta: np.ndarray, waves: np.ndarray
+) -> list[str]:
+    """Say where more or less light stays in a beam than flat parts mirror in the tracer.
+
+    `share` (angles, wavelengths) is what stays in a beam. [1]
+    """
+    notes = []
+    missed = share - rough.flat
+    # Those at other heights take from the beam what they cannot add in phase, and send it
+    # into the angles of their own diffraction, which wide ones keep in the beam's bin
+    spread = waves / (2 * np.pi * rough.corr_length)
+    taken = np.where(spread > 1 / LEAST_CURVATURE, -missed, 0.0)
+    if taken.max() > MOST_COHERENT:
+        a, w = np.unravel_index(np.argmax(taken), taken.shape)
+        notes.append(
+            f"{100 * rough.flat:.2g} % of the surface is flat and is traced as a mirror, "
+            "but its parts lie at different heights and interfere: "
+            f"{100 * share[a, w]:.2g} % of the light stays in the specular beam at "
+            f"{_place(theta[a], waves[w])}, the rest spreads by about "
+            f"{np.rad2deg(spread[w]):.2g} deg"
+            f"{_others(taken > MOST_COHERENT)}."
+        )
+    if missed.max() > MOST_COHERENT:
+        a, w = np.unravel_index(np.argmax(missed), missed.shape)
+        notes.append(
+            f"{100 * missed[a, w]:.2g} % of the light stays in a coherent specular beam at "
+            f"{_place(theta[a], waves[w])} (rms height {rough.height_rms:.3g} um), which "
+            "geometric optics spreads over the lobe"
+            f"{_others(missed > MOST_COHERENT)}."
+        )
+    return notes
 
 
 def _between_nodes(rough: Roughness, wave: float) -> str:

@@ -12,8 +12,8 @@ from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface
 LINES, HEIGHTS = 256, 8192
 # A facet that deviates less than this from the mean plane mirrors as the plane does [1]
 FLAT = 1e-4
-# Share of a Gaussian variable within its rms: curvatures of a map are judged by this
-# quantile, which the few edges between flat facets do not move
+# Share of a Gaussian variable within its rms: the typical curvature of a map is this
+# quantile. Edges between flat facets do not move it; they move the mean
 WITHIN_RMS = float(special.erf(np.sqrt(0.5)))
 
 
@@ -141,7 +141,8 @@ def _of_ensemble(surface: GaussianSurface | MeasuredSurface) -> Roughness:
 
 def _of_map(surface: HeightMap) -> Roughness:
     """Scales of a map, from lines of it along both axes."""
-    heights = _about_plane(surface)
+    tilts = _tilts(surface)
+    heights = _about_plane(surface, tilts)
     slopes = surface.slopes()
     slope = float(np.sqrt(np.mean([np.nanvar(s) for s in slopes])))
     found = []
@@ -159,25 +160,38 @@ def _of_map(surface: HeightMap) -> Roughness:
             one[3] / d for d, one in zip(surface.spacing, found, strict=True)
         )),
         lengths=_fewest(surface.size, [one[3] for one in found]),
-        heights=kept, flat=_flat_share(surface), generated=False,
+        heights=kept, flat=_parallel_share(surface, tilts), generated=False,
     )  # fmt: skip
 
 
-def _flat_share(surface: HeightMap) -> float:
-    """Share of the cells that are parallel to the mean plane. [1]"""
+def _parallel_share(surface: HeightMap, tilts: tuple[float, float]) -> float:
+    """Share of the cells that are parallel to a plane of these slopes. [1]"""
     (nx, ny), (along_x, along_y) = surface.cells, surface.slopes()
-    level = np.abs(along_x - np.nanmean(along_x))[:, :ny] <= FLAT
-    level &= np.abs(along_y - np.nanmean(along_y))[:nx] <= FLAT
+    level = np.abs(along_x - tilts[0])[:, :ny] <= FLAT
+    level &= np.abs(along_y - tilts[1])[:nx] <= FLAT
     return float(level.mean())
 
 
-def _about_plane(surface: HeightMap) -> np.ndarray:
-    """Heights about the mean plane, which a periodic surface has at no tilt. [um]"""
+def _tilts(surface: HeightMap) -> tuple[float, float]:
+    """Slopes of the plane that the map lies about, which has none if it is periodic.
+
+    The plane that most of the map is parallel to, if there is one; the mean plane of a few
+    terraces is none of theirs.
+    """
+    if surface.periodic:
+        return 0.0, 0.0
+    along_x, along_y = surface.slopes()
+    common = float(np.nanmedian(along_x)), float(np.nanmedian(along_y))
+    if _parallel_share(surface, common) > 0.5:
+        return common
+    return float(np.nanmean(along_x)), float(np.nanmean(along_y))
+
+
+def _about_plane(surface: HeightMap, tilts: tuple[float, float]) -> np.ndarray:
+    """Heights about a plane of these slopes. [um]"""
     heights = surface.heights - np.nanmean(surface.heights)
     if not surface.periodic:
-        tilts = [np.nanmean(slope) * d for slope, d in zip(
-            surface.slopes(), surface.spacing, strict=True)]  # fmt: skip
-        for axis, tilt in enumerate(tilts):
+        for axis, tilt in enumerate(np.multiply(tilts, surface.spacing)):
             n = heights.shape[axis]
             ramp = tilt * (np.arange(n) - (n - 1) / 2)
             heights = heights - np.expand_dims(ramp, 1 - axis)
@@ -199,7 +213,10 @@ def _of_lines(
             - 2 * whole[:, lag : lag + end]
             + whole[:, :end]
         )
-        bends.append(np.quantile(second, WITHIN_RMS) / (lag * step) ** 2)
+        # The mean of a Gaussian is 0.8 of its rms. It exceeds the quantile where flat
+        # facets meet at edges: then 1/mean is the width of a facet over the turn of an edge
+        bend = max(np.quantile(second, WITHIN_RMS), second.mean())
+        bends.append(bend / (lag * step) ** 2)
     first = np.diff(whole[:, : count + 1] if periodic else lines)
     square = float((first**2).mean())
     change = float((np.diff(first) ** 2).mean()) if first.shape[-1] > 1 else 0.0

@@ -6,7 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pbrdf import Drops, Film, GaussianSurface, HeightMap, Material, Scene, Spheres
+from pbrdf import (
+    Drops,
+    Film,
+    GaussianSurface,
+    HeightMap,
+    Material,
+    Scene,
+    Spheres,
+    simulate,
+)
 from pbrdf.contaminants import place
 from pbrdf.contaminants.ground import Ground
 from pbrdf.contaminants.shapes import cap
@@ -290,3 +299,32 @@ def test_small_drops_and_thin_films_are_reported_where_a_wavelength_is_known():
     assert contamination_warnings(large.reports, 0.55) == []
     # A broad band makes thin films incoherent
     assert len(contamination_warnings(placement.reports, 0.55, bandwidth=0.2)) == 1
+
+
+def test_of_two_bodies_that_are_the_same_the_first_is_there():
+    """Black after clear changes nothing, bit for bit; before it, it is all."""
+    places = [(10.0, 20.0), (159.9, 90.0)]
+
+    def spheres(material, radius=6.0, positions=places):
+        return Spheres.at(positions, radius=radius, material=material)
+
+    def run(*contaminants):
+        return simulate(Scene(ROUGH, Material.mirror(), contaminants), 0.6, n_rays=3200)
+
+    clear, black = spheres(Material(1.4)), spheres(Material.black())
+    alone = run(clear)
+    # The second names one place by its image a period further
+    moved = spheres(Material.black(), positions=[(10.0 + 128.0, 20.0), (159.9, 90.0)])
+    assert_array_equal(run(clear, moved).brdf, alone.brdf)
+    assert_array_equal(run(black, clear).brdf, run(black).brdf)
+    assert float(alone.albedo.sum()) == pytest.approx(1.0, abs=1e-12)
+    # Bodies that only have the same axis stay, as does one of two that differs
+    small = spheres(Material.black(), radius=(6.0, 5.0))
+    counts = [len(place([clear, one], ROUGH, SEED).bodies) for one in (black, small)]
+    assert counts == [2, 3]
+    # Drops of one seed lie at the same places
+    dew = [
+        Drops(contact_angle=1.2, coverage=0.1, number_density=1e-3, seed=3, material=one)
+        for one in (WATER, Material(1.333, 0.05))
+    ]
+    assert len(place(dew, ROUGH, SEED).bodies) == len(place(dew[:1], ROUGH, SEED).bodies)

@@ -94,6 +94,29 @@ def test_a_file_of_constants_may_hold_the_albedo_of_the_base(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("substrate", "message"),
+    [
+        ("n = 1.4\nwavelength_um = [0.4, 0.8]", "nothing listed by 'wavelength_um'"),
+        ("n = [1.3, 1.4]", "'n' without 'wavelength_um'. Write one of n, kappa"),
+        ("n = [1.3, true]\nwavelength_um = [0.4, 0.8]", "'n' holds true"),
+        ("n = 1.4\nkappa = '0.1'", "'kappa' holds '0.1'"),
+        ("n = [1.3, 1.4]\nwavelength_um = [0.8, 0.4]", "wavelength must"),
+        ("n = {formula = 1, coefficients = [0, '1'], range_um = [0.4, 0.8]}",
+         r".n\]: 'coefficients' holds '1'"),
+        ("n = {formula = 11, coefficients = [0, 1], range_um = [0.4, 0.8]}",
+         r".n\]: formula must be one of 1 to 9"),
+        ("n = {formula = 1, coefficients = [0, 1], range_um = [0.4]}",
+         r".n\]: range_um must be two wavelengths"),
+    ],
+)  # fmt: skip
+def test_constants_that_are_none_are_named_with_their_table(tmp_path, substrate, message):
+    path = tmp_path / "scene.toml"
+    path.write_text(f"[surface]\ntype = 'flat'\n[substrate]\n{substrate}\n")
+    with pytest.raises(DataFileError, match=rf"^scene.toml: \[substrate.*{message}"):
+        load_scene(path)
+
+
+@pytest.mark.parametrize(
     ("constant", "message"),
     [
         ('{ file = "n.csv" }', "n.csv: expected kappa, got n only"),

@@ -124,6 +124,34 @@ def test_nodes_suit_the_lobe_and_the_file_says_how_well(tmp_path, slope):
     assert here == pytest.approx(float(said.sel(brightness="1 to 10 %")), abs=1e-6)
 
 
+def test_the_stated_error_holds_for_all_pairs_of_directions(tmp_path):
+    """A steep surface, bright near the horizon; directions by zenith and azimuth here."""
+    from scipy.interpolate import interpn
+
+    model = MicrofacetModel(Material(1.5, 0.3), slope_rms=1.0)
+    stated = export_mitsuba(model, tmp_path / "steep.pbsdf")
+    fields = parse(tmp_path / "steep.pbsdf")
+    axes = [fields[name][0].astype(float) for name in ("phi_d", "theta_d", "theta_h")]
+    rng = np.random.default_rng(3)
+    points = rng.uniform([-3.14, 0.0, 0.0], [3.14, 1.57, 1.57], (4000, 3))
+    zeniths = np.array([angles(*directions(*point)) for point in points])
+    kept = np.max(zeniths[:, :2], axis=1) < np.radians(84.9)
+    points, zeniths = points[kept], zeniths[kept]
+    # Even over pairs of directions: 4 cos theta_d is the Jacobian of the half vector
+    weight = np.sin(2 * points[:, 1]) * np.sin(points[:, 2])
+    expected = model.brdf(*zeniths.T)[:, 0, 0]
+    found = interpn(axes, fields["M"][..., 0, 0, 0].astype(float), points)
+    error, part = np.abs(found / expected - 1), expected / stated.attrs["peak_M00"]
+    order = np.flatnonzero(part > 0.01)[np.argsort(error[part > 0.01])]
+    share = np.cumsum(weight[order])
+    p95 = error[order][np.searchsorted(share, 0.95 * share[-1])]
+    assert p95 < 0.01
+    said = stated.error.isel(brightness=slice(2)).sel(quantile="p95")[:, 0, 0]
+    assert 0.3 * float(said.min()) < p95 < 2.0 * float(said.max())
+    grazing = stated.error.sel(brightness="beyond 85 degrees", quantile="p95")
+    assert float(grazing[0, 0]) > 0.05
+
+
 def test_a_table_too_coarse_states_its_error(tmp_path):
     fine = export_mitsuba(METAL, tmp_path / "fine.pbsdf")
     coarse = export_mitsuba(METAL, tmp_path / "coarse.pbsdf", shape=(25, 16, 18))

@@ -232,6 +232,13 @@ def test_counts_are_no_truth_values(name):
         simulate(SCENE, 0.3, **{"n_rays": 320, name: True})
 
 
+@pytest.mark.parametrize("name", ["variance_reduction", "explain", "fold"])
+@pytest.mark.parametrize("value", [2, 1, "no", None])
+def test_switches_are_truth_values(name, value):
+    with pytest.raises(TypeError, match=f"{name} must be True or False, got"):
+        simulate(SCENE, 0.3, n_rays=320, **{name: value})
+
+
 def test_a_source_too_near_the_horizon_is_refused():
     scene = Scene(SURFACE.sample(3), Material.mirror())
     with pytest.raises(ValueError, match=r"theta_i must be at most .* cells"):

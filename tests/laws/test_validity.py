@@ -13,6 +13,7 @@ from pbrdf import (
     MeasuredSurface,
     MicrofacetModel,
     Scene,
+    materials,
     observe,
     simulate,
 )
@@ -147,9 +148,11 @@ def test_a_model_is_judged_where_its_heights_are_known():
 def test_films_interfere_only_where_light_comes_back():
     waves = np.array([0.55, 2.95])
     report = [{"kind": "film", "thickness": 20.0}]
-    n, kappa = np.full(2, 1.33), np.array([0.05, 0.28])
-    clear = judge_contaminants(report, waves, [(n, np.array([0.0, 0.0]))])
-    black = judge_contaminants(report, waves, [(n, kappa)])
+    kappa = np.array([0.05, 0.28])
+    clear = judge_contaminants(report, waves, [Material(1.33)])
+    black = judge_contaminants(
+        report, waves, [Material.from_table(wavelength=waves, n=[1.33, 1.33], kappa=kappa)]
+    )
     assert_allclose(clear.numbers["film_field"], [1.0, 1.0])
     back = np.exp(-4 * np.pi * kappa * 20 / waves)
     assert_allclose(black.numbers["film_field"], back)
@@ -158,7 +161,46 @@ def test_films_interfere_only_where_light_comes_back():
     scene = Scene(HeightMap.flat((9.0, 9.0)), GLASS, Film(thickness=3.0))
     with pytest.warns(AccuracyWarning, match="it interferes"):
         result = simulate(scene, 0.3, n_rays=320, wavelength=0.55)
-    assert result.film_field.item() == pytest.approx(1.0, abs=1e-3)
+    n, under = materials.get("water").indices(0.55)[0], GLASS.n
+    assert result.film_field.item() == pytest.approx((under - n) / (under + n), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("film", "ground"),
+    [
+        (Material.black(), GLASS), (Material(1.0), GLASS), (Material(GLASS.n), GLASS),
+        (Material(1.33), Material.black()), (Material.mirror(), GLASS),
+    ],
+)  # fmt: skip
+def test_a_film_with_one_reflecting_side_does_not_interfere(film, ground):
+    report = [{"kind": "film", "thickness": 3.0}]
+    assert not judge_contaminants(report, 0.55, [film], [ground]).notes
+
+
+def test_the_size_of_interference_is_that_of_the_wave_solution():
+    # |r + (1 - r²) s exp(iδ)|² over all δ, without further passes
+    r, s = (1.33 - 1.0) / 2.33, (1.5 - 1.33) / 2.83
+    waves = np.abs(r + (1 - r * r) * s * np.exp(1j * np.linspace(0, 2 * np.pi, 721))) ** 2
+    size = 100 * (waves.max() - waves.mean()) / waves.mean()
+    report = [{"kind": "film", "thickness": 3.0}]
+    note = judge_contaminants(report, 0.55, [Material(1.33)], [Material(1.5)]).notes[0]
+    assert f"by up to {size:.2g} %" in note
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_narrow_flats_at_different_heights_interfere(periodic):
+    high = np.random.default_rng(0).integers(0, 2, (8, 8))
+    steps = np.kron(high, np.ones((8, 8))) * 0.1375
+
+    def notes(width, wave=0.55, rise=1.0):
+        stepped = HeightMap(rise * steps, width / 8, periodic=periodic)
+        return " ".join(judge(roughness_of(stepped), np.array([0.3]), wave).notes)
+
+    assert "parts lie at different heights and interfere: 11 % of the light" in notes(1.6)
+    assert "tangent plane" in notes(1.6)
+    # Wide ones keep what they diffract in the beam's bin, and low ones add in phase
+    assert "interfere" not in notes(160.0) + notes(1.6, rise=1e-2)
+    assert "tangent plane" not in notes(160.0)
 
 
 def test_coarse_and_small_surfaces_are_warned_of_with_the_size():

@@ -52,6 +52,10 @@ def test_a_point_is_the_simulation_of_its_scene(whole: Path) -> None:
     assert float(here.rel_error) == alone.attrs["rel_error"]
     assert float(here.realizations) == 8
     assert (stored.state == 1).all()
+    # Both indices of this slope are warned of
+    assert alone.attrs["warnings"]
+    for text in alone.attrs["warnings"]:
+        assert f"{text} (2 runs)" in stored.attrs["warnings"]
 
 
 @pytest.mark.usefixtures("by_points")

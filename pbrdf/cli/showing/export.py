@@ -180,7 +180,8 @@ def _accuracy_lines(accuracy: "xr.Dataset") -> Iterator[str]:
             f"{100 * float(others.sel(quantile=label)):.2g} %)"
             for label in here["quantile"].values
         )
-        yield f"  M00 {name} of its peak: {shares}"
+        what = f"M00 {name} of its peak" if "%" in name else f"zeniths {name}"
+        yield f"  {what}: {shares}"
 
 
 def export_mesh(
