@@ -8,7 +8,7 @@ from pbrdf.sweeps.description import Sweep
 from pbrdf.sweeps.layout import STATE, Layout
 from pbrdf.sweeps.memory import check_sweep
 from pbrdf.sweeps.report import Report
-from pbrdf.sweeps.store import Mark
+from pbrdf.sweeps.store import Mark, said
 from pbrdf.sweeps.tasks import compute
 from pbrdf.tracer.arguments import worker_count
 
@@ -43,7 +43,7 @@ def computed(
         attrs={
             "design": sweep.design.kind,
             "sweep": sweep.document,
-            "warnings": [f"{text} ({n} runs)" for text, n in report.warnings.items()],
+            "warnings": said(report.warnings),
         },
     )
     return dataset.reset_coords("projected_solid_angle"), report

@@ -8,7 +8,7 @@ import json
 import shutil
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import blake2b
@@ -127,7 +127,7 @@ class Store:
             counted: Counter[str] = Counter()
             for _, mark in self.marks():
                 counted.update(mark.warnings)
-            told = [f"{text} ({count} runs)" for text, count in sorted(counted.items())]
+            told = said(counted)
             metadata = json.loads(root.read_text(encoding="utf-8"))
             if metadata["attributes"].get("warnings") != told:
                 metadata["attributes"]["warnings"] = told
@@ -136,6 +136,14 @@ class Store:
 
     def _mark_file(self, group: int) -> Path:
         return self.path / _MARKS / f"{group}.json"
+
+
+def said(warnings: Mapping[str, int]) -> list[str]:
+    """Write warnings and at how many points they were said, in one order."""
+    return [
+        f"{text} ({count} run{'s' * (count > 1)})"
+        for text, count in sorted(warnings.items())
+    ]
 
 
 def digest(block: dict[str, np.ndarray]) -> str:

@@ -52,10 +52,6 @@ def test_a_point_is_the_simulation_of_its_scene(whole: Path) -> None:
     assert float(here.rel_error) == alone.attrs["rel_error"]
     assert float(here.realizations) == 8
     assert (stored.state == 1).all()
-    # Both indices of this slope are warned of
-    assert alone.attrs["warnings"]
-    for text in alone.attrs["warnings"]:
-        assert f"{text} (2 runs)" in stored.attrs["warnings"]
 
 
 @pytest.mark.usefixtures("by_points")
@@ -185,6 +181,18 @@ def test_the_store_can_be_opened_while_it_is_filled(tmp_path: Path) -> None:
     attributes = json.loads((path / "zarr.json").read_text())["attributes"]
     assert attributes["design"] == "grid"
     assert opened(path).attrs["source"] == "scene.toml"
+
+
+@pytest.mark.usefixtures("by_points")
+def test_the_store_says_what_its_points_were_warned_of(tmp_path: Path) -> None:
+    """Parts tell only of their own points, the store of all that are there."""
+    text = SWEEP.replace("[0.05, 0.1, 0.2]", "[0.1, 0.3]").replace("= 200", "= 64")
+    sweep, path = load_sweep(written(tmp_path, text)), tmp_path / "s.zarr"
+    for part, runs in ((1, 1), (2, 2)):
+        run_sweep(sweep, path, workers=1, part=(part, 2))
+        (note,) = opened(path).attrs["warnings"]
+        assert note.startswith("A period of 4.8 correlation lengths is too short")
+        assert note.endswith(f" ({runs} run{'s' * (runs > 1)})")
 
 
 def test_a_forecast_counts_what_is_written(tmp_path: Path) -> None:
