@@ -110,6 +110,20 @@ class Accessor:
         """
         return derived.interpolate(self._dataset, places)
 
+    def beside(self, model: Any, name: str = "model") -> xr.Dataset:
+        """Return the result and a model in its bins, along a dimension `state`.
+
+        `polar`, with `minus="model"` too, and `plane` then draw the two beside each other.
+
+        Parameters
+        ----------
+        model : MicrofacetModel, WaveModel, or other with `brdf`
+            Averaged over each bin, with cos(theta) dOmega; its errors are 0.
+        name : str
+            Of the model; the result is named "simulated".
+        """
+        return derived.beside(self._dataset, model, name)
+
     def polar(
         self,
         elements: str | Sequence[str] = ("M00", "M10", "DOLP"),

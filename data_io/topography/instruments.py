@@ -4,6 +4,7 @@ It reads about forty formats (SUR, OPD, PLUX, AL3D, VK, Gwyddion, AFM and others
 optional dependency, the extra ``pbrdf[formats]``.
 """
 
+import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -39,6 +40,8 @@ INSTRUMENT_SUFFIXES = {
 _NO_HEIGHT = 1e30
 _NANO_PER_MILLI = 1e-6
 _PARK_TAG = 50432
+# What tifffile raises of pictures that are damaged, or none
+_NO_TIFF = (OSError, ValueError, TypeError, LookupError, ArithmeticError, struct.error)
 
 
 def read_instrument_map(
@@ -159,8 +162,7 @@ def is_park_tiff(path: Path) -> bool:
         with tifffile.TiffFile(path) as content:
             tags = getattr(content.pages[0], "tags", ())
             return any(tag.code == _PARK_TAG for tag in tags)
-    # Parsers of damaged pictures fail in every way there is
-    except Exception:
+    except _NO_TIFF:
         return False
 
 

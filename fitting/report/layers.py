@@ -6,22 +6,20 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-import numpy as np
 import xarray as xr
 
 from data_io import read_model
 from pbrdf import Material, MicrofacetModel, load_scene
+from pbrdf.derived.bins import on_bins
 from pbrdf.derived.elements import mueller
 from pbrdf.errors import DataFileError
 
 if TYPE_CHECKING:
     from pbrdf import Scene
 
-__all__ = ["Layers", "fitted_layers", "layers_of", "light", "on_bins"]
+__all__ = ["Layers", "fitted_layers", "layers_of", "light"]
 
 _BINS = ("theta_s", "dphi", "stokes_out", "stokes_in")
-# Directions along each side of a bin over which the model is averaged
-_WITHIN = 3
 _PLACES = {"theta_i", "wavelength", "phi_i"}
 # Fitted parameters that need no other simulation
 _CARRIED = {"specular_gain", "diffuse_albedo", "slope_rms"}
@@ -114,38 +112,6 @@ def model_of(result: xr.Dataset) -> MicrofacetModel | None:
     if not isinstance(slope, float) or not places <= _PLACES:
         return None
     return MicrofacetModel(scene.substrate, slope_rms=slope)
-
-
-def on_bins(model: MicrofacetModel, like: xr.DataArray) -> xr.Dataset:
-    """Average the BRDF of a model over the bins of a result [1/sr].
-
-    Each bin is sampled at 3 x 3 directions, weighted by cos(theta) dOmega as the simulation
-    weighs them.
-    """
-    n_theta, n_dphi = like.sizes["theta_s"], like.sizes["dphi"]
-    within = (np.arange(_WITHIN) + 0.5) / _WITHIN - 0.5
-    theta = like.theta_s.values[:, None] + within * np.pi / 2 / n_theta
-    dphi = like.dphi.values[:, None] + within * 2 * np.pi / n_dphi
-    weight = np.sin(2 * theta) / np.sin(2 * theta).sum(axis=1, keepdims=True)
-    rows = "IQUV"
-    pick = [[rows.index(str(s)) for s in like[d].values] for d in _BINS[2:]]
-    places = [str(d) for d in like.dims if d not in _BINS]
-    out = np.empty([like.sizes[d] for d in (*places, *_BINS)])
-    for at in np.ndindex(*(like.sizes[d] for d in places)):
-        here = like.isel(dict(zip(places, at, strict=True))).coords
-        wave = float(here["wavelength"]) if "wavelength" in here else None
-        phi_i = here["phi_i"].values if "phi_i" in here else 0.0
-        found = model.brdf(
-            float(here["theta_i"]),
-            theta[:, None, :, None],
-            dphi[None, :, None, :],
-            wave,
-            phi_i=float(phi_i) if np.asarray(phi_i).dtype.kind == "f" else 0.0,
-        )
-        mean = np.einsum("tpabij,ta->tpij", found, weight) / _WITHIN
-        out[at] = mean[..., pick[0], :][..., pick[1]]
-    coords = {d: like[d] for d in (*places, *_BINS)}
-    return xr.Dataset({"brdf_total": ((*places, *_BINS), out)}, coords)
 
 
 def with_readings(layers: Layers, readings: xr.Dataset | None) -> Layers:

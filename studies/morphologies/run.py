@@ -77,28 +77,14 @@ def look(make, seeds, rays):
     return {name: np.array([one[name] for one in found]) for name in found[0]}, result
 
 
-def model_bins(slope, result):
-    """M00 and M10 of the microfacet model, averaged over the same bins by midpoints."""
-    model = MicrofacetModel(MATERIAL, slope_rms=slope)
-    fine = (np.arange(4) + 0.5) / 4 - 0.5
-    theta = (result.theta_s.values[:, None] + fine * (np.pi / 2 / N_THETA)).ravel()
-    phi = (result.dphi.values[:, None] + fine * (2 * np.pi / N_DPHI)).ravel()
-    brdf = model.brdf(THETA_I[:, None, None], theta[:, None], phi)
-    weight = np.cos(theta) * np.sin(theta)
-    shape = (len(THETA_I), N_THETA, 4, N_DPHI, 4)
-    heavy = weight.reshape(N_THETA, 4)[None, :, :, None, None]
-    return [
-        (brdf[..., row, 0].reshape(shape) * heavy).sum((2, 4)) / (heavy.sum(2) * 4)[:, :, 0]
-        for row in (0, 1)
-    ]
-
-
 def compare(name, seeds, rays):
     """One row for each incidence."""
     seen, result = look(MADE[name], seeds, rays)
     statistics = surface_statistics(MADE[name](0))
     slope = max(statistics.slope_rms.value, 0.02)
-    m00, m10 = model_bins(slope, result)
+    model = result.pbrdf.beside(MicrofacetModel(MATERIAL, slope_rms=slope))
+    model = model.brdf_total.sel(state="model", stokes_in="I")
+    m00, m10 = (model.sel(stokes_out=row).values for row in "IQ")
     weight = result.projected_solid_angle.values
     rows = []
     for i, theta in enumerate(THETA_I):

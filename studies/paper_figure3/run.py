@@ -1,7 +1,8 @@
-"""Figure 3 of the paper: a rough surface with spheres on it, and its light."""
+"""Figure 3 of the paper: a rough surface with spheres on it, and its light.
 
-import argparse
-import tomllib
+Takes a file of parameters and --quick.
+"""
+
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from pbrdf import GaussianSurface, Material, Scene, Spheres, simulate
 from pbrdf.plots import COLOURS, new_figure
 from pbrdf.plots.bodies import scene_picture
+from studies.arguments import told
 
 HERE = Path(__file__).parent
 CAPTION_SLOPE = 0.05
@@ -58,12 +60,7 @@ def draw(results, incidence):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("parameters", nargs="?", default=HERE / "parameters.toml")
-    parser.add_argument("--quick", action="store_true", help="fewer and smaller runs")
-    arguments = parser.parse_args()
-    settings = tomllib.loads(Path(arguments.parameters).read_text())
-    options = settings["quick"] if arguments.quick else {}
+    settings, options = told(__file__, __doc__)
     made = scenes(settings)
     slope = made["clean"].surface.facet_slope_rms[0]
     print(f"facet slope rms {slope:.4f}; the caption says {CAPTION_SLOPE:g}\n")

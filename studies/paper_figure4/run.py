@@ -1,13 +1,15 @@
-"""Figure 4 of the paper: what several bounces add, on glass and on a perfect mirror."""
+"""Figure 4 of the paper: what several bounces add, on glass and on a perfect mirror.
 
-import argparse
-import tomllib
+Takes a file of parameters and --quick.
+"""
+
 from pathlib import Path
 
 import numpy as np
 
 from pbrdf import GaussianSurface, Material, Scene, simulate
 from pbrdf.plots import COLOURS, new_figure
+from studies.arguments import told
 
 HERE = Path(__file__).parent
 
@@ -68,12 +70,7 @@ def draw(drawn, incidence):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("parameters", nargs="?", default=HERE / "parameters.toml")
-    parser.add_argument("--quick", action="store_true", help="fewer and smaller runs")
-    arguments = parser.parse_args()
-    settings = tomllib.loads(Path(arguments.parameters).read_text())
-    options = settings["quick"] if arguments.quick else {}
+    settings, options = told(__file__, __doc__)
     print("| slope | incidence | n | one bounce | more | more over one |")
     print("|---|---|---|---|---|---|")
     for k, case in enumerate(settings["case"]):

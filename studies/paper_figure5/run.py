@@ -1,15 +1,15 @@
-"""Figure 5 of the paper: M00, M10 and M20 of clean surfaces, Monte Carlo against model."""
+"""Figure 5 of the paper: M00, M10 and M20 of clean surfaces, Monte Carlo against model.
 
-import argparse
-import tomllib
+Takes a file of parameters and --quick.
+"""
+
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 
 from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene, simulate
 from pbrdf.plots import hemisphere, plane_cuts
-from studies.bins import as_result
+from studies.arguments import told
 
 HERE = Path(__file__).parent
 
@@ -63,8 +63,8 @@ def table(settings, options):
     for slope in settings["scene"]["slopes"]:
         for n in settings["scene"]["n"]:
             result = traced(settings, slope, n, **options)
-            model = as_result(MicrofacetModel(Material(n), slope), result)
-            rows = compare(result.sel(bounces="1"), model)
+            model = result.pbrdf.beside(MicrofacetModel(Material(n), slope))
+            rows = compare(result.sel(bounces="1"), model.sel(state="model"))
             for theta, row in zip(settings["scene"]["incidences_deg"], rows, strict=True):
                 cells = " | ".join(
                     f"{100 * row[m]:.2f} ({100 * row[m + ' error']:.2f})"
@@ -81,26 +81,16 @@ def draw(settings, options):
     """Polar plots of both, and both in the plane of incidence."""
     drawn = settings["drawn"]
     result = traced(settings, drawn["slope"], drawn["n"], **options)
-    model = as_result(MicrofacetModel(Material(drawn["n"]), drawn["slope"]), result)
+    both = result.pbrdf.beside(MicrofacetModel(Material(drawn["n"]), drawn["slope"]))
     place = {"theta_i": np.deg2rad(drawn["incidence_deg"])}
-    for name, one in (("traced", result), ("model", model)):
-        figure = hemisphere(one, drawn["elements"], places=place)
+    for name, state in (("traced", "simulated"), ("model", "model")):
+        figure = hemisphere(both.sel(state=state), drawn["elements"], places=place)
         figure.savefig(HERE / f"{name}.png", dpi=160)
-    both = xr.concat(
-        [result[["brdf_total", "brdf_total_stderr"]], model],
-        xr.DataArray(["Monte Carlo", "model"], dims="state", name="state"),
-        combine_attrs="override",
-    )
     plane_cuts(both, drawn["elements"], places=place).savefig(HERE / "plane.png", dpi=160)
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("parameters", nargs="?", default=HERE / "parameters.toml")
-    parser.add_argument("--quick", action="store_true", help="fewer realisations")
-    arguments = parser.parse_args()
-    settings = tomllib.loads(Path(arguments.parameters).read_text())
-    options = settings["quick"] if arguments.quick else {}
+    settings, options = told(__file__, __doc__)
     table(settings, options)
     draw(settings, options)
 

@@ -1,13 +1,15 @@
-"""Figure 8 of the paper: vinyl in the plane of incidence, and what its gain would mean."""
+"""Figure 8 of the paper: vinyl in the plane of incidence, and what its gain would mean.
 
-import argparse
-import tomllib
+Takes a file of parameters and --quick.
+"""
+
 from pathlib import Path
 
 import numpy as np
 
 from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene, simulate
 from pbrdf.plots import COLOURS, new_figure
+from studies.arguments import told
 
 HERE = Path(__file__).parent
 FARTHEST_DEG = 75.0
@@ -55,14 +57,8 @@ def draw(view, columns):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("parameters", nargs="?", default=HERE / "parameters.toml")
-    parser.add_argument("--quick", action="store_true", help="fewer realisations")
-    arguments = parser.parse_args()
-    settings = tomllib.loads(Path(arguments.parameters).read_text())
-    slope, view, value, error = traced(
-        settings, settings["quick"] if arguments.quick else {}
-    )
+    settings, options = told(__file__, __doc__)
+    slope, view, value, error = traced(settings, options)
     model = MicrofacetModel(Material(settings["n"]), slope)
     theta = np.deg2rad(view)
     matrix = model.brdf(

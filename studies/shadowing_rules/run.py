@@ -8,7 +8,7 @@ import numpy as np
 
 from pbrdf import GaussianSurface, Material, MicrofacetModel, Scene, simulate
 from pbrdf.analytic import SHADOWING
-from studies.bins import bin_averages
+from pbrdf.derived import bin_averages
 
 FOLDER = Path(__file__).parent
 ANGLES_DEG = (10.0, 41.4, 60.0, 75.0)

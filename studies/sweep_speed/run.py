@@ -10,17 +10,9 @@ import time
 import warnings
 from pathlib import Path
 
-SCENE = """
-[surface]
-type = "gaussian"
-shape = [32, 32]
-spacing_um = 1.0
-corr_length_um = 5.0
-slope_rms = 0.1
+from pbrdf import GaussianSurface, Material, Scene
 
-[substrate]
-n = 1.5
-"""
+SURFACE = GaussianSurface(shape=(32, 32), spacing=1.0, corr_length=5.0, slope_rms=0.1)
 SWEEP = """
 scene = "scene.toml"
 
@@ -49,7 +41,7 @@ def one(kind: str, points: int, rays: int) -> None:
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "scene.toml").write_text(SCENE)
+        Scene(SURFACE, Material(1.5)).to_toml(folder / "scene.toml")
         (folder / "sweep.toml").write_text(SWEEP.format(points=points, rays=rays))
         sweep = load_sweep(folder / "sweep.toml")
         # Kernels compiled and loaded before the clock starts

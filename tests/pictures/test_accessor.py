@@ -129,3 +129,34 @@ def test_what_was_not_computed_is_refused_by_name(ds):
     with pytest.raises(ValueError, match=r"chosen by wavelength of 0\.45 um, 0\.85 um"):
         ds.pbrdf.polar("M00", theta_i=0.3)
     assert pbrdf.accessor.Accessor is not None
+
+
+class Cosines:
+    """A model whose means over bins are known: cos theta_s cos dphi, and factors."""
+
+    def brdf(self, theta_i, theta_s, dphi, wavelength=None, *, phi_i=0.0):
+        rows = np.arange(1.0, 17.0).reshape(4, 4)
+        shape = np.cos(theta_s) * np.cos(dphi) * theta_i * wavelength * (1 + phi_i)
+        return shape[..., None, None] * rows
+
+
+def test_a_model_beside_a_result_is_averaged_over_its_bins(ds):
+    both = ds.assign_coords(phi_i=0.7).pbrdf.beside(Cosines(), "cosines")
+    assert list(both.state.values) == ["simulated", "cosines"]
+    assert_allclose(both.brdf_total.sel(state="simulated"), ds.brdf_total)
+    model = both.sel(state="cosines")
+    assert not model.brdf_total_stderr.any()
+    # Bin 2 of 6 in zenith, 3 of 8 in azimuth, by the integrals of cos^2 sin and cos sin
+    low, high, half = np.pi / 6, np.pi / 4, np.pi / 8
+    zenith = (np.cos(low) ** 3 - np.cos(high) ** 3) / 3
+    zenith /= (np.sin(high) ** 2 - np.sin(low) ** 2) / 2
+    azimuth = np.cos(3 * np.pi / 4) * np.sin(half) / half
+    here = model.brdf_total.isel(theta_i=1, wavelength=0, theta_s=2, dphi=3)
+    expected = zenith * azimuth * 0.9 * 0.45 * 1.7
+    assert_allclose(here.sel(stokes_out="Q", stokes_in="U"), 7 * expected, rtol=1e-9)
+    assert_allclose(here.sel(stokes_out="V", stokes_in="I"), 13 * expected, rtol=1e-9)
+
+
+def test_a_model_has_no_value_over_other_dimensions(ds):
+    with pytest.raises(ValueError, match=r"a result over slope_rms too.*\.sel"):
+        ds.expand_dims(slope_rms=[0.1, 0.2]).pbrdf.beside(Cosines())

@@ -8,8 +8,9 @@ import pytest
 import xarray as xr
 
 from fitting.report.explorer import page_of
-from fitting.report.layers import model_of, on_bins
+from fitting.report.layers import model_of
 from pbrdf.derived import element
+from pbrdf.derived.bins import on_bins
 from tests.pictures.browser import WIDTHS, asked, assert_sound
 from tests.pictures.results import hand_made
 
