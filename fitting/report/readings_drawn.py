@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pbrdf.plots import COLOURS, new_figure
-from pbrdf.plots.sheet import small, width
+from pbrdf.plots.sheet import lay_out, small, width
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,7 +58,8 @@ def fit_figure(readings: "xr.Dataset", *, width_mm: float = 170.0) -> "Figure":
             for k, ((scan, theta_i, wave), one) in enumerate(here.groupby([*_GROUP])):
                 colour = COLOURS[k % len(COLOURS)]
                 view = np.rad2deg(one.theta_view)
-                label = f"{scan}, {np.rad2deg(theta_i):.4g}°"
+                label = f"{scan}, " if frame.scan.nunique() > 1 else ""
+                label += f"incidence {np.rad2deg(theta_i):.4g}°"
                 label += f", {wave:.4g} µm" if wave > 0 else ""
                 upper.errorbar(
                     view, one.measured, one.stderr, fmt="o", ms=2.4, mfc="white", mew=0.7,
@@ -68,12 +69,16 @@ def fit_figure(readings: "xr.Dataset", *, width_mm: float = 170.0) -> "Figure":
                 lower.plot(view, one.residual, ".", ms=3, color=colour)
             lower.axhspan(-2, 2, color="0.5", alpha=0.18, lw=0)
             upper.set_title(f"{name} [{'1/sr' if name[0] in 'MIf' else '1'}]")
+            upper.tick_params(labelbottom=False)
             lower.set(xlabel="view angle [deg], + forward", ylabel="standard errors")
         for axis in axes.flat:
             axis.set(xlim=(-90, 90), xticks=range(-90, 91, 45))
         for axis in axes[:, len(names) % columns :].flat if len(names) % columns else ():
             axis.set_visible(bool(axis.has_data()))
         handles, labels = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False)
-        figure.draw_without_rendering()
+        figure.legend(
+            handles, labels, loc="outside upper center", ncols=3 if columns > 1 else 2,
+            frameon=False,
+        )  # fmt: skip
+        lay_out(figure)
     return figure

@@ -8,7 +8,7 @@ import numpy as np
 from data_io.micrograph.levels import load_grey
 from fitting.statistics.slopes import slope_distribution
 from pbrdf.plots import COLOURS, new_figure
-from pbrdf.plots.sheet import halo, small, width
+from pbrdf.plots.sheet import halo, lay_out, log_ticks, small, width
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,15 +38,19 @@ def surface_figure(
     found : SurfaceStatistics
         Of it.
     width_mm : float
-        Width that the figure is printed at; below 115 mm it has two columns. [mm]
+        Width that the figure is printed at; below 115 mm panels stand in a column. [mm]
     """
     from matplotlib import rc_context
 
     mends = [one for one in getattr(surface, "mends", ()) if one.kind != "terraces"]
     inches = width(width_mm)
-    rows, columns = (2, 3) if inches > 4.5 else (3, 2)
+    # In a column the first panel, which may be a map, is higher
+    heights, columns = ([1.95] * 2, 3) if inches > 4.5 else ([2.1, *([1.5] * 5)], 1)
     with rc_context(small()):
-        figure, axes = new_figure(rows, columns, (inches, rows * 1.95))
+        figure, axes = new_figure(
+            len(heights), columns, (inches, sum(heights)), height_ratios=heights
+        )
+        figure.set_layout_engine("constrained", w_pad=0.06)
         panels = iter(axes.flat)
         _draw_surface(next(panels), found)
         if mends:
@@ -60,7 +64,7 @@ def surface_figure(
             _draw_bands(next(panels), found)
         for empty in panels:
             empty.set_visible(False)
-        figure.draw_without_rendering()
+        lay_out(figure)
     return figure
 
 
@@ -98,7 +102,7 @@ def edge_figure(
             left, low - 0.025 * rows, f"{length:g} µm", color="white", va="bottom",
             path_effects=halo("black"),
         )  # fmt: skip
-        figure.draw_without_rendering()
+        lay_out(figure)
     return figure
 
 
@@ -116,15 +120,16 @@ def _draw_surface(axis: "Axes", found: "SurfaceStatistics") -> None:
         vmin=-reach, vmax=reach, interpolation="none",
     )  # fmt: skip
     axis.grid(False)
-    axis.set(xlabel="x [um]", ylabel="y [um]", title=f"heights without form ({found.form})")
+    title = "heights [um]" if found.form == "none" else f"heights without {found.form} [um]"
+    axis.set(xlabel="x [um]", ylabel="y [um]", title=title)
     if axis.figure is not None:
-        axis.figure.colorbar(image, ax=axis, label="um", shrink=0.8)
+        # Inside the axis, whose own place counts it in: what stands beside it ends there
+        axis.figure.colorbar(image, cax=axis.inset_axes((1.04, 0.1, 0.05, 0.8)))
     length = _round_length(size[0] / 4)
     left, low = 0.05 * size[0], 0.06 * size[1]
     axis.plot([left, left + length], [low, low], color="white", linewidth=3)
     axis.text(
-        left + length / 2, low + 0.02 * size[1], f"{length:g} um", color="white",
-        ha="center", va="bottom",
+        left, low + 0.02 * size[1], f"{length:g} um", color="white", ha="left", va="bottom",
     )  # fmt: skip
 
 
@@ -171,20 +176,24 @@ def _draw_heights(axis: "Axes", found: "SurfaceStatistics") -> None:
     histogram = found.height_histogram()
     axis.stairs(histogram.density, histogram.edges, fill=True, color=COLOURS[5], alpha=0.55)
     x = np.linspace(histogram.edges[0], histogram.edges[-1], 300)
-    axis.plot(x, histogram.gaussian(x), color=COLOURS[1], label="Gaussian")
-    axis.set(xlabel="height [um]", ylabel="density [1/um]", title="heights")
-    axis.legend(frameon=False)
+    axis.plot(x, histogram.gaussian(x), color=COLOURS[1])
+    axis.set(
+        xlabel="height [um]", ylabel="density [1/um]", title="heights; line: Gaussian"
+    )  # fmt: skip
 
 
 def _draw_autocorrelation(axis: "Axes", found: "SurfaceStatistics") -> None:
-    for colour, one in zip(COLOURS, found.axes, strict=False):
-        curve = one.autocorrelation
-        name = f"{one.axis} measured"
-        axis.plot(curve.lag, curve.measured, ".", color=colour, label=name)
-        axis.plot(curve.lag, curve.fitted, color=colour, label=curve.form)
+    curves = {one.axis: one.autocorrelation for one in found.axes}
+    for colour, (name, curve) in zip(COLOURS, curves.items(), strict=False):
+        axis.plot(curve.lag, curve.measured, ".", ms=3, color=colour, label=name)
+        axis.plot(curve.lag, curve.fitted, color=colour)
     axis.axhline(np.exp(-1), color="grey", linewidth=0.8, linestyle=":")
-    axis.set(xlabel="lag [um]", ylabel="autocorrelation [1]", title="autocorrelation")
-    axis.legend(frameon=False)
+    forms = ", ".join(dict.fromkeys(curve.form for curve in curves.values()))
+    axis.set(
+        xlabel="lag [um]", ylabel="autocorrelation [1]",
+        title=f"autocorrelation, {forms}",
+    )  # fmt: skip
+    axis.legend(frameon=False, handlelength=1.0)
 
 
 def _draw_spectrum(axis: "Axes", found: "SurfaceStatistics") -> None:
@@ -194,16 +203,20 @@ def _draw_spectrum(axis: "Axes", found: "SurfaceStatistics") -> None:
             continue
         spectrum = found.psd(one.axis)
         axis.loglog(
-            spectrum.frequency[1:], spectrum.psd_1d[1:], color=colour, alpha=0.5,
-            label=f"{one.axis} measured",
+            spectrum.frequency[1:], spectrum.psd_1d[1:], ".", ms=2.5, color=colour,
+            label=one.axis,
         )  # fmt: skip
-        axis.loglog(spectrum.frequency[1:], spectrum.model[1:], color=colour, label="model")
-        axis.axvline(1 / one.cutoff, color=colour, linewidth=0.8, linestyle=":")
+        axis.loglog(spectrum.frequency[1:], spectrum.model[1:], color=colour)
+        axis.axvline(
+            1 / one.cutoff, color=colour, linewidth=0.8, linestyle=":",
+            label="resolved" if one is found.axes[-1] else None,
+        )  # fmt: skip
     axis.set(
-        xlabel="spatial frequency [1/um]", ylabel="one-sided spectrum [um3]",
-        title="spectrum; dotted: resolved",
+        xlabel="spatial frequency [1/um]", ylabel="spectrum [um³]",
+        title="one-sided spectrum",
     )  # fmt: skip
-    axis.legend(frameon=False)
+    log_ticks(axis.xaxis)
+    axis.legend(frameon=False, handlelength=1.0)
 
 
 def _draw_slopes(axis: "Axes", surface: Any, found: "SurfaceStatistics") -> None:
@@ -214,15 +227,20 @@ def _draw_slopes(axis: "Axes", surface: Any, found: "SurfaceStatistics") -> None
     for colour, (name, density) in zip(COLOURS, slopes.density.items(), strict=False):
         axis.errorbar(
             middle, density, slopes.stderr[name], color=colour, fmt=".", markersize=2.5,
-            elinewidth=0.7, label=f"{name} measured, rms {slopes.rms[name]:.3g}",
+            elinewidth=0.7, label=f"{name}, rms {slopes.rms[name]:.3g}",
         )  # fmt: skip
         rms = table.get(name, np.nan)
         if rms > 0:
             gauss = np.exp(-0.5 * (middle / rms) ** 2) / (np.sqrt(2 * np.pi) * rms)
             axis.plot(middle, gauss, "--", color=colour, label=f"model, rms {rms:.3g}")
     axis.set(xlabel="slope [1]", ylabel="density [1]", title="slopes, noise included")
-    axis.set_ylim(0, 1.45 * axis.get_ylim()[1])
-    axis.legend(frameon=False, loc="upper right")
+    place = axis.get_subplotspec()
+    alone = place is not None and place.get_gridspec().ncols == 1
+    axis.set_ylim(0, (1.55 if alone else 1.75) * axis.get_ylim()[1])
+    axis.legend(
+        frameon=False, loc="upper right", ncols=2 if alone else 1, handlelength=1.4,
+        columnspacing=1.0, labelspacing=0.3, borderaxespad=0.1,
+    )  # fmt: skip
 
 
 def _draw_bands(axis: "Axes", found: "SurfaceStatistics") -> None:
@@ -242,4 +260,5 @@ def _draw_bands(axis: "Axes", found: "SurfaceStatistics") -> None:
         xlabel="shortest wavelength [um]", ylabel="slope rms [1]",
         title="slope against cut-off",
     )  # fmt: skip
-    axis.legend(frameon=False)
+    log_ticks(axis.xaxis)
+    axis.legend(frameon=False, handlelength=1.0)

@@ -16,13 +16,13 @@ _ANGLES = ("theta_i", "phi_i", "theta_s", "dphi", "contact_angle")
 _CHANGE = 0.1
 
 
-def in_words(name: str, value: Any) -> str:
+def in_words(name: str, value: Any, digits: int = 6) -> str:
     """Write a coordinate as people read it: angles in degrees, wavelengths in um."""
     if isinstance(value, str | np.str_):
         return str(value)
     if name in _ANGLES:
-        return f"{np.rad2deg(float(value)):.6g} deg"
-    return f"{float(value):.6g}{' um' if name == 'wavelength' else ''}"
+        return f"{np.rad2deg(float(value)):.{digits}g} deg"
+    return f"{float(value):.{digits}g}{' um' if name == 'wavelength' else ''}"
 
 
 def choose(result: xr.Dataset, places: Mapping[str, Any]) -> xr.Dataset:

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pbrdf.plots.sheet import new_figure, small, width
+from pbrdf.plots.sheet import lay_out, new_figure, small, width
 from pbrdf.scene.solids import scene_solids
 
 if TYPE_CHECKING:
@@ -18,6 +18,8 @@ __all__ = ["scene_picture"]
 _PIXELS = 900
 _LIGHT = np.array([-0.45, 0.35, 0.82])
 _SURFACE, _BODIES = np.array([0.78, 0.75, 0.70]), np.array([0.25, 0.55, 0.85])
+# A wider sheet has its title in one line [in]
+_WIDE = 4.5
 _SHADE, _GLOSS, _POWER = 0.35, 0.55, 40
 
 
@@ -70,8 +72,9 @@ def scene_picture(
         axis.text(left, low - 0.015 * rows, f"{length:g} µm", va="bottom")
         what = [type(one).__name__.lower() for one in scene.contaminants]
         on = f", {' and '.join(what)} on {100 * share:.2g} % of the picture" if what else ""
-        axis.set_title(f"surface{on}; one scale for lengths and heights")
-        figure.draw_without_rendering()
+        apart = " " if inches > _WIDE else "\n"
+        axis.set_title(f"surface{on};{apart}one scale for lengths and heights")
+        lay_out(figure)
     return figure
 
 

@@ -16,6 +16,11 @@ if TYPE_CHECKING:
 
 __all__ = ["plane_cuts"]
 
+# What a dimension is called on the sheet
+_SPOKEN = {
+    "theta_i": "incidence", "wavelength": "wavelength", "phi_i": "azimuth of the source",
+    "state": "state",
+}  # fmt: skip
 _CURVES = ("theta_view", "stokes_out", "stokes_in")
 
 
@@ -63,7 +68,7 @@ def plane_cuts(
                 error = factor * found.stderr.transpose(*order).values
             for k, place in enumerate(np.ndindex(value.shape[:-1])):
                 label = ", ".join(
-                    in_words(d, cut[d].values[i])
+                    in_words(d, cut[d].values[i], 4)
                     for d, i in zip(curves, place, strict=True)
                 )
                 colour = COLOURS[k % len(COLOURS)]
@@ -82,11 +87,11 @@ def plane_cuts(
         if len(labels) > 1:
             figure.legend(
                 handles, labels, loc="outside lower center", ncols=4 if inches > 4.5 else 2,
-                frameon=False, title=" and ".join(curves),
+                frameon=False, title=" and ".join(_SPOKEN.get(d, d) for d in curves),
             )  # fmt: skip
         chosen = [
-            f"{name} {in_words(str(name), here[name].values)}"
-            for name in ("theta_i", "wavelength", "phi_i", "state")
+            f"{spoken} {in_words(name, here[name].values, 4)}"
+            for name, spoken in _SPOKEN.items()
             if name in here.coords and here[name].ndim == 0
         ]
         note = "plane of incidence, + forward; bands: 2 standard errors"
@@ -114,4 +119,10 @@ def _scaled(axis: Any, name: str, value: np.ndarray, scale: str) -> None:
         axis.set_yscale("log")
         axis.set_ylim(max(float(lit.min()) / 2, top / 1e6), 2 * top)
     elif scale in ("symlog", "log"):
-        axis.set_yscale("symlog", linthresh=top / 1e3)
+        low = top / 1e3
+        whole = 10.0 ** np.arange(np.ceil(np.log10(low) + 1e-9), np.log10(top) + 1e-9)
+        axis.set_yscale("symlog", linthresh=low, linscale=0.5)
+        signed = np.nanmin(value) < -low
+        axis.set_ylim(-2 * top if signed else -low, 2 * top)
+        axis.set_yticks([*(-whole[::-1] if signed else ()), 0.0, *whole])
+        axis.minorticks_off()

@@ -13,6 +13,8 @@ __all__ = ["Panel", "colour_bar", "draw_disc"]
 
 # Name of the element, title, values and errors (theta_s, dphi)
 Panel = tuple[str, str, np.ndarray, np.ndarray | None]
+# Straight pieces that make a circle round
+_ROUND = 72
 # End of the colours of AOLP [deg]
 _AOLP_END = 90.0
 
@@ -21,10 +23,14 @@ def draw_disc(axis: Any, panel: Panel, look: Any, incidence: float) -> Any:
     """Draw one hemisphere, incidence in degrees; return what a colour bar explains."""
     name, title, values, error = panel
     norm, colours, _ = look
+    # Wide bins in pieces, so that rings are round
+    pieces = -(-_ROUND // values.shape[1])
+    values = np.repeat(values, pieces, axis=1)
+    error = None if error is None else np.repeat(error, pieces, axis=1)
     n_theta, n_dphi = values.shape
     zenith = np.linspace(0.0, 90.0, n_theta + 1)
     # Bins are centred on dphi = 0, which is drawn to the left
-    azimuth = (np.arange(n_dphi + 1) - 0.5) * 2 * np.pi / n_dphi + np.pi
+    azimuth = (np.arange(n_dphi + 1) - pieces / 2) * 2 * np.pi / n_dphi + np.pi
     axis.set_facecolor("0.85")
     axis.grid(visible=False)
     image = axis.pcolormesh(
@@ -87,7 +93,7 @@ def _hatch(axis: Any, azimuth: np.ndarray, zenith: np.ndarray, cells: np.ndarray
         # Neighbours of a ring are one piece, from where they begin to where they end
         turns = np.flatnonzero(np.diff(row, prepend=False, append=False))
         for begin, end in turns.reshape(-1, 2):
-            along = np.linspace(azimuth[begin], azimuth[end], 4 * (end - begin) + 1)
+            along = np.linspace(azimuth[begin], azimuth[end], end - begin + 1)
             inner = np.stack([along, np.full(along.size, zenith[ring])], axis=-1)
             outer = np.stack([along[::-1], np.full(along.size, zenith[ring + 1])], axis=-1)
             outlines.append(Path(np.concatenate([inner, outer, inner[:1]]), closed=True))

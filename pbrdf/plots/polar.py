@@ -10,7 +10,7 @@ from pbrdf.derived.elements import Element, element, folded, mueller
 from pbrdf.derived.places import choose, in_words
 from pbrdf.plots.disc import Panel, colour_bar, draw_disc
 from pbrdf.plots.limits import look_of
-from pbrdf.plots.sheet import scene_of, small, title_of, width
+from pbrdf.plots.sheet import lay_out, scene_of, small, title_of, width
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,6 +22,9 @@ _BINS = ("theta_s", "dphi", "stokes_out", "stokes_in")
 _SHAPE = 0.80
 # Narrowest panel whose labels do not run into each other [in]
 _LEAST = 40.0 / 25.4
+# So many letters fit above a panel [1/in]
+_LETTERS = 16.0
+_Look = tuple[Panel, Any]
 
 
 def hemisphere(
@@ -88,13 +91,18 @@ def hemisphere(
     here, mirrored = folded(here) if fold else (here, False)
     rows = _rows(here, elements, errors, minus)
     inches = width(width_mm)
-    if "state" not in mueller(here)[0].dims:
-        # No narrower than labels need
-        fit = max(1, int(inches / _LEAST))
-        rows = [row[k : k + fit] for k in range(0, len(rows[0]), fit) for row in rows]
-    columns = max(len(row) for row in rows)
+    # No narrower than labels need
+    fit = max(1, int(inches / _LEAST))
+    looks = _shared_looks(rows, scale)
+    drawn = [
+        list(zip(row, look, strict=True)) for row, look in zip(rows, looks, strict=True)
+    ]
+    if "state" in mueller(here)[0].dims:
+        drawn = [row[k : k + fit] for row in drawn for k in range(0, len(row), fit)]
+    else:
+        drawn = [row[k : k + fit] for k in range(0, len(rows[0]), fit) for row in drawn]
     with rc_context(small()):
-        figure = _drawn(here, rows, columns, inches, scale)
+        figure = _drawn(here, drawn, inches)
         note = "★ source   + specular   hatched: below 2 standard errors"
         heading = "\n".join(
             line
@@ -106,9 +114,8 @@ def hemisphere(
             if line
         )
         figure.suptitle(heading)
-        figure.draw_without_rendering()
-        # Laid out; doing it again at each saving takes longer than to draw
-        figure.set_layout_engine("none")
+        # Its ticks are the same at any size
+        lay_out(figure, rounds=1)
     return figure
 
 
@@ -181,32 +188,29 @@ def _error_panel(name: str, title: str, one: Element) -> Panel:
     return f"error of {name}", heading, error, None
 
 
-def _drawn(
-    here: xr.Dataset, rows: list[list[Panel]], columns: int, inches: float, scale: str
-) -> "Figure":
+def _drawn(here: xr.Dataset, rows: list[list[_Look]], inches: float) -> "Figure":
     from matplotlib.figure import Figure
 
+    columns = max(len(row) for row in rows)
     side = inches / columns
     figure = Figure(
         figsize=(inches, side / _SHAPE * len(rows) + 0.55), layout="constrained"
     )
-    shared = _shared_looks(rows, scale)
     incidence = float(np.rad2deg(here.theta_i))
     for number, row in enumerate(rows):
-        offset = (
-            columns - len(row) if len(rows) > 1 and number and len(row) < columns else 0
-        )
-        offset = offset if row[0][0] == "difference" else 0
+        # A difference stands below what it is of; the state that is taken off has none
+        offset = columns - len(row) if row[0][0][0] == "difference" else 0
         axes, images = [], []
-        for place, (panel, look) in enumerate(zip(row, shared[number], strict=True)):
+        for place, ((name, title, value, error), look) in enumerate(row):
             at = number * columns + place + offset + 1
             axis = figure.add_subplot(len(rows), columns, at, projection="polar")
-            images.append(draw_disc(axis, panel, look, incidence))
+            words = title.replace(", ", ",\n") if len(title) > _LETTERS * side else title
+            images.append(draw_disc(axis, (name, words, value, error), look, incidence))
             axes.append(axis)
-        if _alike(row):
-            colour_bar(figure, axes, images[0], shared[number][0])
+        if _alike([panel for panel, _ in row]):
+            colour_bar(figure, axes, images[0], row[0][1])
         else:
-            for axis, image, look in zip(axes, images, shared[number], strict=True):
+            for axis, image, (_, look) in zip(axes, images, row, strict=True):
                 colour_bar(figure, [axis], image, look)
     return figure
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from pbrdf.plots.sheet import COLOURS, SIZE, new_figure, small, width
+from pbrdf.plots.sheet import COLOURS, SIZE, lay_out, new_figure, small, width
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,7 +53,7 @@ def scan_figure(
 
     with rc_context(small()):
         figure = _drawn(measured, curves, width(width_mm))
-        figure.draw_without_rendering()
+        lay_out(figure)
     return figure
 
 
@@ -70,7 +70,7 @@ def _drawn(measured: xr.Dataset, curves: xr.Dataset | None, inches: float) -> "F
     per = 1 if curves is None else 2
     blocks = [(*panel, name) for panel in panels for name in names]
     rows = -(-len(blocks) // columns)
-    heights = [1.5, 0.95][:per] * rows
+    heights = ([1.5, 0.95] if columns > 1 else [1.05, 0.65])[:per] * rows
     figure, axes = new_figure(
         per * rows, columns, (inches, sum(heights) + 0.5), height_ratios=heights
     )
@@ -82,6 +82,7 @@ def _drawn(measured: xr.Dataset, curves: xr.Dataset | None, inches: float) -> "F
             curve = curves.sel(theta_i=angle, method="nearest", tolerance=1e-6)
             _draw_curves(upper, name, curve)
             _draw_residuals(axes[per * row + 1, column], name, scan, curve)
+            upper.tick_params(labelbottom=False)
         _draw_points(upper, name, scan)
         upper.set_title(f"{names[name]}, {title}")
         if name == "M00" and _spans_decades(scan[name].values):
@@ -221,4 +222,4 @@ def _draw_residuals(axis: "Axes", name: str, scan: xr.Dataset, curve: xr.Dataset
             axis.set_ylim(-top, top)
         else:
             axis.set_ylim(-max(3.0, 1.1 * far), max(3.0, 1.1 * far))
-    axis.set_ylabel(unit)
+    axis.set_ylabel("std. errors" if unit == "standard errors" else unit)

@@ -9,7 +9,16 @@ import xarray as xr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "WIDTHS", "halo", "new_figure", "small", "title_of"]
+__all__ = [
+    "COLOURS",
+    "WIDTHS",
+    "halo",
+    "lay_out",
+    "log_ticks",
+    "new_figure",
+    "small",
+    "title_of",
+]
 
 # Colours that stay apart in print and for colour-blind eyes (Okabe and Ito)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -34,6 +43,29 @@ def new_figure(
     return figure, axes
 
 
+def log_ticks(axis: Any) -> None:
+    """Label a logarithmic axis by decades, or by what lies between where these are few."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    if high < 100 * low:
+        between = (1.0, 2.0, 5.0) if high < 30 * low else (1.0, 3.0)
+        axis.set_major_locator(LogLocator(subs=between))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def lay_out(figure: "Figure", rounds: int = 2) -> None:
+    """Give each part its place for good; at every saving it would take longer than drawing.
+
+    Ticks are chosen for the place that an axis has, so that what is labelled by them needs
+    two rounds.
+    """
+    for _ in range(rounds):
+        figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+
+
 def width(width_mm: float) -> float:
     """Return the width of a figure [in].
 
@@ -54,8 +86,8 @@ def small() -> Any:
         "font.size": SIZE, "axes.titlesize": SIZE, "axes.labelsize": SIZE,
         "xtick.labelsize": SIZE - 0.5, "ytick.labelsize": SIZE - 0.5,
         "legend.fontsize": SIZE - 0.5, "figure.titlesize": SIZE + 0.5,
-        "axes.linewidth": 0.6, "hatch.linewidth": 0.35, "pdf.fonttype": 42,
-        "svg.fonttype": "none",
+        "axes.linewidth": 0.6, "lines.linewidth": 1.0, "lines.markersize": 3.0,
+        "hatch.linewidth": 0.35, "pdf.fonttype": 42, "svg.fonttype": "none",
     }  # fmt: skip
 
 

@@ -6,11 +6,15 @@ import xarray as xr
 from matplotlib.patches import PathPatch
 from numpy.testing import assert_allclose
 
-from data_io import write_result
+from data_io import Profile, write_result
+from fitting import surface_statistics
+from fitting.report.surface import surface_figure
+from pbrdf import GaussianSurface
 from pbrdf.cli import main
-from pbrdf.plots import hemisphere, plane_cuts, scan_figure
+from pbrdf.plots import hemisphere, new_figure, plane_cuts, scan_figure
 from pbrdf.plots.limits import reach_of
 from pbrdf.plots.scans import residuals
+from tests.pictures.readable import unreadable
 from tests.pictures.results import hand_made
 
 
@@ -28,10 +32,10 @@ def test_forward_is_right_and_the_source_left():
     axis = figure.axes[0]
     mesh = next(one for one in axis.collections if one.get_array() is not None)
     bright = int(np.argmax(mesh.get_array()))
-    # Corners of that cell on the sheet, from the axis's own projection
-    corners = mesh.get_coordinates()[
-        bright // 8 : bright // 8 + 2, bright % 8 : bright % 8 + 2
-    ]
+    # Corners of a piece of that cell on the sheet, from the axis's own projection
+    wide = mesh.get_array().shape[1]
+    ring, sector = divmod(bright, wide)
+    corners = mesh.get_coordinates()[ring : ring + 2, sector : sector + 2]
     x = axis.transData.transform(corners.reshape(-1, 2))[:, 0].mean()
     centre = axis.transData.transform((0.0, 0.0))[0]
     assert x > centre
@@ -61,7 +65,10 @@ def test_uncertain_cells_are_hatched_and_unknown_ones_left_out():
     result.brdf_total[2, 2] = np.nan
     figure = hemisphere(result, ("M00",))
     axis = figure.axes[0]
-    assert axis.collections[0].get_array().mask.sum() == 1
+    unknown = axis.collections[0].get_array().mask
+    pieces = unknown.shape[1] // 8
+    assert unknown[2, 2 * pieces : 3 * pieces].all()
+    assert unknown.sum() == pieces
     (outline,) = [patch for patch in axis.findobj(PathPatch) if patch.get_hatch()]
     # The dark cell and no other: dphi = 0 is drawn to the left, half a bin each side
     shape = result.brdf_total.shape[:2]
@@ -116,7 +123,8 @@ def test_wet_minus_dry_is_what_it_says():
         "M00, dry [1/sr]", "M00, 90 deg [1/sr]", "M00, 90 deg minus dry [1/sr]"
     ]  # fmt: skip
     last = [axis for axis in figure.axes if axis.name == "polar"][-1].collections[0]
-    assert_allclose(last.get_array(), 0.5 * two.brdf_total[..., 0, 0])
+    pieces = last.get_array().shape[1] // 8
+    assert_allclose(last.get_array()[:, ::pieces], 0.5 * two.brdf_total[..., 0, 0])
     with pytest.raises(ValueError, match="minus must be one of dry, 90 deg"):
         hemisphere(states, ("M00",), minus="wet")
 
@@ -145,6 +153,14 @@ def scan(angles=(0.3, 1.2), wavelengths=(0.5, 0.8)) -> xr.Dataset:
     )  # fmt: skip
 
 
+def curves_of(*angles: float) -> xr.Dataset:
+    return xr.Dataset(
+        {f"analytic_{n}": (("theta_i", "theta_view"), np.ones((len(angles), 3)))
+         for n in ("M00", "M10", "m10")},
+        {"theta_i": list(angles), "theta_view": [-1.5, 0.0, 1.5]},
+    )  # fmt: skip
+
+
 def test_residuals_are_points_in_standard_errors():
     view = np.deg2rad(np.arange(-30.0, 81.0))
     curve = xr.Dataset(
@@ -162,16 +178,11 @@ def test_residuals_are_points_in_standard_errors():
 
 
 def test_each_incidence_and_wavelength_has_its_panel():
-    curves = xr.Dataset(
-        {f"analytic_{n}": (("theta_i", "theta_view"), np.ones((2, 3)))
-         for n in ("M00", "M10", "m10")},
-        {"theta_i": [0.3, 1.2], "theta_view": [-1.5, 0.0, 1.5]},
-    )  # fmt: skip
-    figure = scan_figure(scan(), curves)
+    figure = scan_figure(scan(), curves_of(0.3, 1.2))
     titles = {axis.get_title() for axis in figure.axes} - {""}
     assert len(titles) == 3 * 4
     assert "M00 [1/sr], incidence 68.75°, 0.8 µm" in titles
-    lower = [axis for axis in figure.axes if "standard" in axis.get_ylabel()]
+    lower = [axis for axis in figure.axes if "std. errors" in axis.get_ylabel()]
     assert len(lower) == 4
     assert all(line.get_linestyle() == "None" for line in lower[0].lines[1:])
 
@@ -208,3 +219,52 @@ def test_histograms_agree_with_the_table():
     for one, row in zip(shown, ("height_rms", "slope_rms_x", "slope_rms_y"), strict=True):
         assert one.rms == table[row]
     assert shown[2].rms > 1.5 * shown[1].rms
+
+
+def states_of(one: xr.Dataset) -> xr.Dataset:
+    names = xr.DataArray(["dry", "15 deg", "179 deg"], dims="state", name="state")
+    return xr.concat([one, 1.5 * one, 0.9 * one], names, data_vars="all")
+
+
+def profile() -> Profile:
+    """Return a short one: its spectrum spans a decade."""
+    heights = GaussianSurface(shape=(48, 48), spacing=1.0, corr_length=4.0, slope_rms=0.3)
+    return Profile(np.arange(48.0), heights.sample(2).heights[:, 5])
+
+
+def decades() -> xr.Dataset:
+    """Return a result that is drawn logarithmically, of both signs."""
+    result = hand_made().isel(wavelength=0)
+    ring = xr.DataArray(10.0 ** -np.arange(6.0), dims="theta_s")
+    signed = result.brdf_total * ring * np.cos(result.dphi)
+    return result.assign(brdf_total=signed.transpose(*result.brdf_total.dims))
+
+
+@pytest.mark.parametrize(
+    "drawn",
+    [
+        lambda: hemisphere(
+            states_of(hand_made().isel(wavelength=0, theta_i=0)), ("M00",),
+            minus="dry", width_mm=85.0,
+        ),
+        lambda: hemisphere(decades(), ("M00", "M10"), theta_i=0.3, width_mm=85.0),
+        lambda: plane_cuts(decades(), ("M10",), width_mm=85.0),
+        lambda: plane_cuts(hand_made(), ("M00", "AOLP"), width_mm=85.0),
+        lambda: scan_figure(scan((0.3,)), curves_of(0.3), width_mm=85.0),
+        lambda: surface_figure(profile(), surface_statistics(profile()), width_mm=85.0),
+    ],
+    ids=["states", "decades", "cuts-of-decades", "cuts", "scan", "surface"],
+)  # fmt: skip
+def test_every_label_is_readable_as_printed(drawn):
+    assert unreadable(drawn()) == []
+
+
+def test_letters_over_letters_and_off_the_sheet_are_seen():
+    figure, axes = new_figure(1, 1, (3.0, 2.0))
+    assert unreadable(figure) == []
+    axes[0, 0].text(0.5, 0.5, "one")
+    axes[0, 0].text(0.51, 0.5, "two")
+    figure.text(0.95, 0.5, "far away")
+    over, off = sorted(unreadable(figure), key=len)
+    assert "'one' and 'two' overlap" in over + off
+    assert "'far away' leaves the sheet" in over + off
