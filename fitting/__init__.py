@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from fitting.models.simulated import SimulatedModel
     from fitting.objective.parameters import PARAMETERS
     from fitting.pipeline import PipelineResult, run_pipeline
+    from fitting.prediction.instrument import Instrument
     from fitting.prediction.prediction import Prediction
     from fitting.prediction.run import predict
     from fitting.readings import masks
@@ -34,6 +35,7 @@ __all__ = [
     "FTest",
     "Finding",
     "FitResult",
+    "Instrument",
     "LikelihoodProfile",
     "Noise",
     "PhysicsError",
@@ -61,6 +63,7 @@ _MODULES = {
     "drops.silhouette": ("ContactAngle", "contact_angle"),
     "estimate": ("Estimate",),
     "pipeline": ("PipelineResult", "run_pipeline"),
+    "prediction.instrument": ("Instrument",),
     "prediction.prediction": ("Prediction",),
     "prediction.run": ("predict",),
     "run": ("fit",),

@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 
 from fitting.prediction.comparison import Misfit, misfit
-from fitting.prediction.facets import facets_of, slope_table
+from fitting.prediction.density import slope_table
+from fitting.prediction.facets import facets_of
 from fitting.prediction.prediction import Prediction
 from fitting.statistics.slopes import SlopeDistribution, slope_distribution
 from pbrdf import HeightMap, Material, MicrofacetModel, Scene, simulate

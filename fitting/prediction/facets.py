@@ -12,30 +12,33 @@ then gives back the variance that the smoothing took, and the lobe of the patch 
 as it can be. Where the surface is smooth the patch is large and its lobe sharp; where it is
 rugged the patch is small. On a smooth map both vanish beside the slopes. Over a brushed map
 patches are longer along the grooves, so that each axis gets back what it lost.
+
+An instrument of resolution r > s hid the slopes between s and r from the map. Slopes within
+a distance grow as a power p of it in their variance, and within s they are b, so that
+
+.. math::
+   h^2 = b^2 [(r / s)^p - 1]
+
+is added. Within a smooth hill p = 2, where nothing finer is hidden p = 0; p = 1 between.
+The slopes within r that the map lacks follow from those that it has between r and
+sqrt(2) r, with p = 1: they are 1/(sqrt(2) - 1) as large in their variance.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
 
-from pbrdf.analytic.slope_table import SlopeTable
 from pbrdf.surface.heightmap import HeightMap
 
 Array = np.ndarray
 
 # Principal slopes that differ by less than this factor are those of an isotropic surface
 _ISOTROPIC = 1.2
-# Width of a radial bin, and of the kernel of a table over both axes, beside the rms slope
-_BIN = 0.1
-_KERNEL = 0.15
-_NODES = 161
 # Slopes that are those of rounding
 _FLAT = 1e-6
-# Facets beyond this share of all lie in the last cells of the table
-_WITHIN = 0.9995
 # Patches are sought between a twentieth of a wavelength and this many, each so much larger
 _LARGEST = 20.0
 _RATIO = 1.1
@@ -58,6 +61,12 @@ class Facets:
         In vacuum. [um]
     aspect : float
         Length of the patches along y over that along x; `sizes` is their geometric mean.
+    resolution : float
+        Standard deviation of the instrument's point spread. [um]
+    exponent : float
+        Of the variance of the slopes within a distance, p. [1]
+    bridged : ndarray of bool, shape (n,), optional
+        Facets that the instrument did not see.
     """
 
     slope_x: Array
@@ -66,6 +75,9 @@ class Facets:
     counts: Array
     wavelength: float
     aspect: float = 1.0
+    resolution: float = 0.0
+    exponent: float = 1.0
+    bridged: Array | None = None
 
     @property
     def patch(self) -> float:
@@ -75,15 +87,29 @@ class Facets:
 
     @property
     def blurs(self) -> Array:
-        """Diffraction of each size along x and y, shape (k, 2). [1]"""
-        turned = np.array([self.aspect**0.5, self.aspect**-0.5])
-        return diffraction(self.sizes, self.wavelength)[:, None] * turned
+        """Diffraction and hidden slopes of each size along x and y, shape (k, 2). [1]"""
+        patch = self.sizes[:, None] * np.array([self.aspect**-0.5, self.aspect**0.5])
+        hides = np.maximum(self.resolution / patch, 1.0) ** self.exponent
+        return diffraction(patch, self.wavelength) * np.sqrt(hides)
 
     @property
     def blur(self) -> float:
-        """Rms diffraction of the patches, per axis. [1]"""
+        """Rms of the blur over the patches, per axis. [1]"""
         square = np.mean(self.blurs**2, axis=1)
         return float(np.sqrt(np.average(square, weights=self.counts)))
+
+    @property
+    def hidden(self) -> float:
+        """Rms of the slopes that the instrument hid from light's patches, per axis. [1]"""
+        seen = replace(self, resolution=0.0).blur
+        return float(np.sqrt(max(self.blur**2 - seen**2, 0.0)))
+
+    def stretched(self, factor: float) -> "Facets":
+        """Return the facets with those the instrument did not see so much steeper."""
+        if self.bridged is None:
+            return self
+        scale = np.where(self.bridged, factor, 1.0)
+        return replace(self, slope_x=scale * self.slope_x, slope_y=scale * self.slope_y)
 
     @property
     def slope_rms(self) -> float:
@@ -119,6 +145,7 @@ def facets_of(
     *,
     criterion: float = 1.0,
     resolution: float = 0.0,
+    lost: Array | None = None,
 ) -> Facets:
     """Find the patches of a map and their slopes about the mean plane.
 
@@ -129,13 +156,15 @@ def facets_of(
     resolution : float
         Standard deviation of the instrument's point spread; slopes are smoothed by what a
         patch is larger only. [um]
+    lost : ndarray of bool, shape (nx, ny), optional
+        Nodes that the instrument did not see, bridged.
 
     Raises
     ------
     ValueError
         If the map has fewer than 100 cells of known heights, or is flat.
     """
-    slopes, known = _known_slopes(surface)
+    slopes, known = known_slopes(surface)
     extent = min(n * d for n, d in zip(surface.shape, surface.spacing, strict=True))
     smallest, largest = 0.05 * wavelength, min(_LARGEST * wavelength, extent / 12)
     steps = max(int(np.log(largest / smallest) / np.log(_RATIO)), 0)
@@ -143,20 +172,24 @@ def facets_of(
     left = known.copy()
     aspect = _aspect(slopes, known, surface)
     found: list[Array] = []
+    bridged: list[Array] = []
+    bridges = None if lost is None else _beside(lost, surface)
     counts = np.zeros(sizes.size, dtype=int)
+    unseen: Array | float = 0.0
+    if resolution > 0:
+        blind = _Mean(surface, known, (resolution, resolution))
+        unseen = _hidden(blind, slopes, 1.0)[1] / (np.sqrt(2) - 1)
     for i, size in enumerate(sizes):
-        mean = _Mean(surface, known, (size * aspect**-0.5, size * aspect**0.5))
-        smooth = [mean(s) for s in slopes]
-        hidden = [mean(s**2) - m**2 for s, m in zip(slopes, smooth, strict=True)]
-        within = np.sqrt(np.maximum(hidden[0] / aspect + hidden[1] * aspect, 0.0) / 2)
-        take = left & (within >= criterion * wavelength / (8 * np.pi * size))
+        whole = size**2 * np.array([1 / aspect, aspect])
+        mean = _Mean(surface, known, np.sqrt(np.maximum(whole - resolution**2, 0.0)))
+        smooth, within = _hidden(mean, slopes, aspect)
+        within = within + unseen * min(size / max(resolution, size), 1.0)
+        take = left & (within >= (criterion * wavelength / (8 * np.pi * size)) ** 2)
         last = i == steps or (left.sum() - take.sum()) < _REST * known.sum()
         take = left if last else take
-        if resolution > 0:
-            whole = size**2 * np.array([1 / aspect, aspect])
-            rest = np.sqrt(np.maximum(whole - resolution**2, 0.0))
-            smooth = [_Mean(surface, known, rest)(s) for s in slopes]
         found.append(np.stack([m[take] for m in smooth]))
+        if bridges is not None:
+            bridged.append(bridges[take])
         counts[i] = take.sum()
         left = left & ~take
         if last:
@@ -166,10 +199,11 @@ def facets_of(
     return Facets(
         slope_x=x - x.mean(), slope_y=y - y.mean(), sizes=sizes[filled],
         counts=counts[filled], wavelength=wavelength, aspect=aspect,
+        resolution=resolution, bridged=np.concatenate(bridged) if bridged else None,
     )  # fmt: skip
 
 
-def _known_slopes(surface: HeightMap) -> tuple[list[Array], Array]:
+def known_slopes(surface: HeightMap) -> tuple[list[Array], Array]:
     """Slopes of the cells about their mean, 0 where missing, and which are known."""
     slopes = _cell_slopes(surface.heights, surface)
     known = np.isfinite(slopes[0]) & np.isfinite(slopes[1])
@@ -187,6 +221,13 @@ def _known_slopes(surface: HeightMap) -> tuple[list[Array], Array]:
         )
         raise ValueError(msg)
     return about, known
+
+
+def _hidden(mean: "_Mean", slopes: list[Array], aspect: float) -> tuple[list[Array], Array]:
+    """Mean slopes, and the variance within, each axis by the length of patches there."""
+    smooth = [mean(s) for s in slopes]
+    spread = [mean(s**2) - m**2 for s, m in zip(slopes, smooth, strict=True)]
+    return smooth, np.maximum(spread[0] / aspect + spread[1] * aspect, 0.0) / 2
 
 
 def _aspect(slopes: list[Array], known: Array, surface: HeightMap) -> float:
@@ -234,52 +275,12 @@ def _cell_slopes(heights: Array, surface: HeightMap) -> tuple[Array, Array]:
     return x, y
 
 
+def _beside(nodes: Array, surface: HeightMap) -> Array:
+    """Tell which cells of a map have one of the nodes at a corner."""
+    x, y = _cell_slopes(np.where(nodes, np.nan, 0.0), surface)
+    return np.asarray(np.isnan(x) | np.isnan(y))
+
+
 def diffraction(patch: Array, wavelength: float) -> Array:
     """Blur of the slope of a patch per axis, at normal incidence. [1]"""
     return wavelength / (8 * np.pi * patch)
-
-
-def slope_table(facets: Facets, *, scale: float = 1.0, nodes: int = _NODES) -> SlopeTable:
-    """Density of the blurred slopes: radial, or over both axes where they differ.
-
-    Parameters
-    ----------
-    scale : float
-        Factor on all slopes of patches. [1]
-    """
-    widths, _ = facets.principal
-    reach = 1.1 * float(np.quantile(facets.radius, _WITHIN)) + _BIN
-    limit = scale * widths.max() * reach + 4 * facets.blur
-    grid = np.linspace(-limit, limit, nodes)
-    step = grid[1] - grid[0]
-    density = np.zeros((nodes, nodes))
-    for blur, group in facets.groups():
-        if widths[0] == widths[1]:
-            sharp = _rings(scale * widths[0], facets.radius[group], reach, grid)
-            spread = blur
-        else:
-            x, y = scale * facets.slope_x[group], scale * facets.slope_y[group]
-            sharp = _cells(x, y, grid)
-            spread = np.hypot(blur, _KERNEL * scale * widths.min())
-        density += ndimage.gaussian_filter(
-            sharp, spread / step, mode="constant", truncate=5
-        )
-    return SlopeTable(grid, grid, density)
-
-
-def _rings(width: float, radius: Array, reach: float, grid: Array) -> Array:
-    """Facets per slope area at the nodes, from their |slope| in units of `width`."""
-    count, edges = np.histogram(
-        np.minimum(radius, reach * 0.999), int(reach / _BIN) + 2, (0, reach)
-    )
-    middle = np.append((edges[1:] + edges[:-1]) / 2, edges[-1])
-    ring = np.append(count / np.diff(edges**2), 0.0)
-    return np.interp(np.hypot(grid[:, None], grid) / width, middle, ring, right=0.0)
-
-
-def _cells(slope_x: Array, slope_y: Array, grid: Array) -> Array:
-    """Facets at the nearest nodes; those beyond the grid at its rim."""
-    half = (grid[1] - grid[0]) / 2
-    edges = np.append(grid - half, grid[-1] + half)
-    inside = [np.clip(s, grid[0], grid[-1]) for s in (slope_x, slope_y)]
-    return np.histogram2d(inside[0], inside[1], bins=[edges, edges])[0]

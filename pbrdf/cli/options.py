@@ -138,6 +138,33 @@ Channel = Annotated[
     str | None,
     typer.Option(help="Channel of an instrument's file, by number or name."),
 ]
+Aperture = Annotated[
+    float | None,
+    typer.Option(
+        "--na",
+        min=0.01,
+        max=0.99,
+        help="Numerical aperture of the objective that measured the map.",
+    ),
+]
+InstrumentWavelength = Annotated[
+    float,
+    typer.Option(
+        "--instrument-wavelength-um",
+        min=0.01,
+        max=1e3,
+        help="Mean wavelength of that objective's light.",
+    ),
+]
+Pixel = Annotated[
+    float | None,
+    typer.Option(
+        "--pixel-um",
+        min=1e-6,
+        max=1e3,
+        help="Pixel of that instrument on the surface; if not given, the map's step.",
+    ),
+]
 FormOption = Annotated[
     str,
     typer.Option(

@@ -11,7 +11,8 @@ from scipy import ndimage
 import data_io
 import fitting
 from fitting.prediction.comparison import misfit
-from fitting.prediction.facets import diffraction, facets_of, slope_table
+from fitting.prediction.density import slope_table
+from fitting.prediction.facets import diffraction, facets_of
 from fitting.prediction.scan_density import free_density
 from pbrdf import (
     GaussianSurface,
@@ -148,7 +149,7 @@ def test_terraces_follow_their_truth() -> None:
     views = np.deg2rad(np.arange(0.0, 71.0, 5.0))
     at = (np.deg2rad(30.0), views, np.pi)
     with pytest.warns(UserWarning, match="equal"):
-        found = fitting.predict(digitised, GLASS, wavelength=0.65)
+        found = fitting.predict(digitised, GLASS, wavelength=0.65, resolution=0.1)
     whole = fitting.predict(true, GLASS, wavelength=0.65)
     off = found.brdf(*at)[:, 0, 0] / whole.brdf(*at)[:, 0, 0] - 1
     assert np.sqrt(np.mean(off**2)) < 0.12
@@ -233,6 +234,7 @@ def test_command_tells_what_any_slopes_would_leave(
     np.save(tmp_path / "map.npy", ground(0.3, n=96).heights)
     words = ["predict", str(tmp_path / "map.npy"), "--spacing-um", "1", "--n", "1.5"]
     words += ["--scan", str(tmp_path / "scan.csv"), "--wavelength-um", "0.65"]
+    words += ["--resolution-um", "0.1"]
     assert main(words) == 0
     told = capsys.readouterr().out
     left = re.search(r"Any isotropic slopes .* off by (\d+)% with gain ([\d.]+)", told)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
 
+    from fitting import Instrument
     from fitting.prediction.prediction import Prediction
 
 # Of the sources of most goniometers; only where neither scan nor user says
@@ -42,14 +43,17 @@ def command(
         ),
     ] = None,
     theta_i: options.Incidences = "10,30,50,70",
+    aperture: options.Aperture = None,
+    instrument_wavelength: options.InstrumentWavelength = 0.55,
+    pixel: options.Pixel = None,
     resolution: Annotated[
         float,
         typer.Option(
             "--resolution-um",
             min=0.0,
             max=1e3,
-            help="Standard deviation of the instrument's point spread, about 0.21 of its "
-            "wavelength over its numerical aperture.",
+            help="Of an instrument without an aperture, the standard deviation of its "
+            "point spread.",
         ),
     ] = 0.0,
     diffuse_albedo: Annotated[
@@ -101,7 +105,10 @@ def command(
     if not isinstance(heights, HeightMap):
         msg = f"{surface.name} must be a height map, a profile has slopes along one axis."
         raise ValueError(msg)
-    found = predict(heights, material, wavelength=wave, resolution=resolution, seed=seed)
+    found = predict(
+        heights, material, wavelength=wave, resolution=resolution, seed=seed,
+        instrument=_instrument(aperture, instrument_wavelength, pixel),
+    )  # fmt: skip
     geometry = _plane(options.incidences(theta_i)) if measured is None else measured
     predicted = _readings(found, geometry)
     if output is not None:
@@ -138,6 +145,20 @@ def _wavelength(given: float | None, scan: "xr.Dataset | None") -> float:
     text = f"no wavelength is known: {_ASSUMED:g} um assumed (--wavelength-um)"
     warnings.warn(text, UserWarning, stacklevel=2)
     return _ASSUMED
+
+
+def _instrument(
+    aperture: float | None, wavelength: float, pixel: float | None
+) -> "Instrument | None":
+    """Return the microscope that the options name, if they do."""
+    from fitting import Instrument
+
+    if aperture is not None:
+        return Instrument(aperture=aperture, wavelength=wavelength, pixel=pixel)
+    if pixel is not None:
+        msg = f"--pixel-um must come with --na, got {pixel:g} alone. Give --na too."
+        raise ValueError(msg)
+    return None
 
 
 def _plane(incidences: list[float]) -> "xr.Dataset":
@@ -181,7 +202,7 @@ def _brightest(predicted: "xr.Dataset") -> Iterator[str]:
 
     for theta in np.unique(predicted.theta_i.values):
         here = predicted.isel(geometry=np.flatnonzero(predicted.theta_i.values == theta))
-        at = int(here.M00.argmax())
+        at = int(np.argmax(here.M00.values))
         one = here.isel(geometry=at)
         yield (
             f"incidence {np.rad2deg(theta):.3g} deg: M00 greatest at view "
