@@ -22,6 +22,7 @@ from data_io.reflectance.mitsuba import export_mitsuba
 from data_io.reflectance.model import read_model, write_model
 from data_io.reflectance.result_store import is_result_store
 from data_io.reflectance.results import read_result, write_result
+from data_io.reflectance.wave_file import read_wave_model, write_wave_model
 from data_io.text.files import NotAMapError
 from data_io.text.units import MissingUnitWarning
 from data_io.topography.channels import ChannelWarning
@@ -68,12 +69,14 @@ __all__ = [
     "read_profile_image",
     "read_profile_images",
     "read_result",
+    "read_wave_model",
     "view_angle",
     "write_goniometer",
     "write_model",
     "write_profile",
     "write_profile_overlay",
     "write_result",
+    "write_wave_model",
 ]
 
 

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from fitting.drops.silhouette import ContactAngle, contact_angle
     from fitting.estimate import Estimate
     from fitting.models.simulated import SimulatedModel
+    from fitting.models.waves import WaveSurface
     from fitting.objective.parameters import PARAMETERS
     from fitting.pipeline import PipelineResult, run_pipeline
     from fitting.prediction.instrument import Instrument
@@ -44,6 +45,7 @@ __all__ = [
     "SimulatedModel",
     "SlopeDistribution",
     "SurfaceStatistics",
+    "WaveSurface",
     "check_scan",
     "compare",
     "contact_angle",
@@ -75,6 +77,7 @@ _MODULES = {
     "objective.parameters": ("PARAMETERS",),
     "result.fit_result": ("FitResult",),
     "models.simulated": ("SimulatedModel",),
+    "models.waves": ("WaveSurface",),
     "statistics.surface": ("surface_statistics",),
     "statistics.result": ("SurfaceStatistics",),
 }

@@ -47,9 +47,10 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
         I_p, f_ss, f_sp, f_ps, f_pp; `<name>_stderr` weighs where present. DOLP is left out
         where M00 and M10 are there, from which it was computed. The attribute `quantity` is
         "brdf", or "relative": then every scan gets a free `scale`.
-    model : MicrofacetModel or MuellerModel
+    model : MicrofacetModel, WaveModel or MuellerModel
         Start values, and the values of all that is not free. A simulated surface goes in
-        the same way: `fitting.SimulatedModel`.
+        the same way: `fitting.SimulatedModel`. Of a surface seen by waves height_rms and
+        corr_length may be free: `fitting.WaveSurface`.
     free : sequence of str
         Parameters to vary: names of `fitting.PARAMETERS`.
     bounds : mapping of str to (low, high), optional

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from data_io.reflectance.model_tables import checked_table
 from pbrdf.errors import DataFileError
 from pbrdf.files import complete_file, read_toml
 
@@ -95,8 +96,11 @@ def read_model(path: str | Path) -> "MicrofacetModel":
     source = Path(path)
     document = read_toml(source)
     names = {_key(name): name for name in _names(MicrofacetModel)}
-    table = _table(document, "model", set(names), {"slope_rms"}, source)
-    index = _table(document, "material", _MATERIAL_KEYS, {"n"}, source)
+    if "wave" in document:
+        problem = "holds a model of waves"
+        raise DataFileError(source, problem, "Read it with data_io.read_wave_model.")
+    table = checked_table(document, "model", set(names), {"slope_rms"}, source)
+    index = checked_table(document, "material", _MATERIAL_KEYS, {"n"}, source)
     values = {names[key]: _from_file(names[key], value) for key, value in table.items()}
     try:
         return MicrofacetModel(Material(**index), **values)
@@ -127,19 +131,3 @@ def _from_file(name: str, value: Any) -> Any:
         # What is no number is refused by name by the model
         return math.radians(value) if isinstance(value, int | float) else value
     return tuple(value) if isinstance(value, list) else value
-
-
-def _table(
-    document: Mapping[str, Any], name: str, known: set[str], needed: set[str], source: Path
-) -> dict[str, Any]:
-    table = document.get(name)
-    if not isinstance(table, dict):
-        raise DataFileError(
-            source, f"expected a table [{name}], got none", "A model needs it."
-        )
-    for key in table.keys() - known:
-        cure = f"Known: {', '.join(sorted(known))}."
-        raise DataFileError(source, "unknown key", cure, column=f"[{name}] {key}")
-    for key in needed - table.keys():
-        raise DataFileError(source, "missing key", "Give it.", column=f"[{name}] {key}")
-    return dict(table)

@@ -7,6 +7,7 @@ import xarray as xr
 
 if TYPE_CHECKING:
     from fitting.models.simulated import SimulatedModel
+    from fitting.models.waves import WaveSurface
     from pbrdf import MicrofacetModel
 
 __all__ = ["plane_curves"]
@@ -16,9 +17,10 @@ def plane_curves(
     theta_i: np.ndarray,
     theta_s: np.ndarray,
     *,
-    analytic: "MicrofacetModel",
+    analytic: "MicrofacetModel | WaveSurface",
     monte_carlo: "SimulatedModel | None" = None,
     phi_i: float = 0.0,
+    wavelength: float | None = None,
 ) -> xr.Dataset:
     """Return M00, M10, m10 and DOLP of the models against incidence and signed view.
 
@@ -28,12 +30,14 @@ def plane_curves(
         Incidences. [rad]
     theta_s : ndarray, shape (n,)
         Rising exit zeniths above 0, shown on both sides of the normal. [rad]
-    analytic : MicrofacetModel
-        The analytical model.
+    analytic : MicrofacetModel or WaveSurface
+        The model in closed form.
     monte_carlo : SimulatedModel, optional
         The simulated one.
     phi_i : float
         Azimuth of the plane. [rad]
+    wavelength : float, optional
+        Where the model needs one. [um]
 
     Returns
     -------
@@ -43,7 +47,7 @@ def plane_curves(
     view = np.concatenate([-theta_s[::-1], theta_s])
     angles = np.meshgrid(theta_i, view, indexing="ij")
     where = angles[0], np.abs(angles[1]), np.where(angles[1] > 0.0, np.pi, 0.0)
-    values = _named("analytic", analytic.brdf(*where, phi_i=phi_i))
+    values = _named("analytic", analytic.brdf(*where, wavelength, phi_i=phi_i))
     if monte_carlo is not None:
         simulated = monte_carlo.brdf(*where, phi_i=phi_i)
         error = monte_carlo.stderr(*where, phi_i=phi_i)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-__all__ = ["IndexGrid", "Range"]
+__all__ = ["IndexGrid", "Range", "chebyshev"]
 
 Range = tuple[float, float]
 
@@ -104,8 +104,8 @@ class IndexGrid:
             return [1.0 + 0.0 * n]
         (x_low, x_high), (y_low, y_high) = self._box
         x, y = _reflected(n, kappa)
-        along_x = _chebyshev((2.0 * x - x_low - x_high) / (x_high - x_low))
-        along_y = _chebyshev((2.0 * y - y_low - y_high) / (y_high - y_low))
+        along_x = chebyshev((2.0 * x - x_low - x_high) / (x_high - x_low))
+        along_y = chebyshev((2.0 * y - y_low - y_high) / (y_high - y_low))
         return [
             along_x[i] * along_y[j]
             for i in range(DEGREE + 1)
@@ -133,9 +133,9 @@ def _crowded(low: float, high: float) -> np.ndarray:
     return low + (high - low) * (0.5 + 0.5 * turn)
 
 
-def _chebyshev(x: Any) -> list[Any]:
-    """Return the Chebyshev polynomials T_0 to T_DEGREE."""
+def chebyshev(x: Any, degree: int = DEGREE) -> list[Any]:
+    """Return the Chebyshev polynomials T_0 to T_degree of numbers, arrays or symbols."""
     values = [1.0 + 0.0 * x, x]
-    while len(values) <= DEGREE:
+    while len(values) <= degree:
         values.append(2.0 * x * values[-1] - values[-2])
-    return values
+    return values[: degree + 1]

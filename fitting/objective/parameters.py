@@ -75,6 +75,8 @@ PARAMETERS: Mapping[str, tuple[float, float, float, str, str]] = {
     "grazing_albedo": (0.0, np.inf, 0.1, "1", "strength of the term growing at grazing"),
     "n": (0.05, 10.0, 0.5, "1", "real part of the refractive index"),
     "kappa": (0.0, 20.0, 0.5, "1", "imaginary part of the index, >= 0 absorbs"),
+    "height_rms": (1e-5, 1e3, 0.1, "um", "rms height, of a surface seen by waves"),
+    "corr_length": (1e-3, 1e5, 1.0, "um", "1/e length of its autocorrelation"),
     "slope_rms": (1e-3, 3.0, 0.1, "1", "rms slope per axis"),
     "slope_rms_x": (1e-3, 3.0, 0.1, "1", "rms slope along x"),
     "slope_rms_y": (1e-3, 3.0, 0.1, "1", "rms slope along y"),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fitting.models.analytic import AnalyticModel
+from fitting.models.waves import WaveSurface
 from fitting.objective.forward import INSTRUMENT, Layout, MuellerModel, predict
 from fitting.objective.objective import Objective, Prediction
 from fitting.objective.parameters import Parameter, bounded_parameter
@@ -194,7 +195,12 @@ def _adapter(model: Any, free: Sequence[str]) -> MuellerModel:
         axes = ("slope_rms_x", "slope_rms_y", "orientation")
         split = any(name in axes for name in free)
         return AnalyticModel(model, split_slope=split)
-    msg = f"model must be a MicrofacetModel or a MuellerModel, got {type(model).__name__}."
+    if hasattr(model, "brdf") and hasattr(model, "corr_length"):
+        return WaveSurface(model)
+    msg = (
+        "model must be a MicrofacetModel, a WaveModel or a MuellerModel, got "
+        f"{type(model).__name__}."
+    )
     raise TypeError(msg)
 
 
@@ -281,8 +287,8 @@ def _within(
     if low < valid[0] or high > valid[1]:
         msg = (
             f"bounds of {name} must lie in [{valid[0]:g}, {valid[1]:g}], for which the "
-            f"model was made, got ({low:g}, {high:g}). Give SimulatedModel a wider "
-            "index_range."
+            f"model was made, got ({low:g}, {high:g}). Give SimulatedModel or WaveSurface "
+            "a wider index_range, WaveSurface a larger reach."
         )
         raise ValueError(msg)
     return low, high

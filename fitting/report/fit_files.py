@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from data_io import in_plane, write_model
+from data_io import in_plane, write_model, write_wave_model
 from fitting.models.cuts import plane_curves
+from fitting.models.waves import WaveSurface
 from fitting.report.spectrum import spectrum_figure, spectrum_table
 from pbrdf.plots import scan_figure
 
@@ -51,7 +52,11 @@ def write_fit(
         "made_by": record,
     }
     for name, model in _distinct(result).items():
-        write_model(model, folder / name, notes=notes)
+        if _of_waves(model):
+            beside = {"beside": model.beside}
+            write_wave_model(model.model, folder / name, notes=notes | beside)
+        else:
+            write_model(model, folder / name, notes=notes)
     table = spectrum_table(result)
     if len(table):
         table.to_csv(folder / "spectrum.csv")
@@ -64,7 +69,8 @@ def write_fit(
         curves = plane_curves(
             np.unique(plane.theta_i.values),
             zeniths,
-            analytic=getattr(model, "model", model),
+            analytic=model if _of_waves(model) else getattr(model, "model", model),
+            wavelength=plane.wavelength.values[0] if _of_waves(model) else None,
             monte_carlo=model if hasattr(model, "simulation") else None,
             phi_i=float(plane.phi_i.values[0]) - result.values.get("orientation", 0.0),
         )
@@ -77,12 +83,17 @@ def _distinct(result: "FitResult") -> dict[str, Any]:
     models: dict[str, Any] = {}
     for key, model in result.models.items():
         # Of a simulated surface the analytical model that it corrects
-        analytic = getattr(model, "model", model)
+        analytic = model if _of_waves(model) else getattr(model, "model", model)
         if all(analytic != other for other in models.values()):
             models[key] = analytic
     if len(models) == 1:
         return {"model.toml": next(iter(models.values()))}
     return {f"model_{_words(key)}.toml": model for key, model in models.items()}
+
+
+def _of_waves(model: Any) -> bool:
+    """Whether it is a surface seen by waves, with gain and base beside the model."""
+    return isinstance(model, WaveSurface)
 
 
 def _words(key: str) -> str:

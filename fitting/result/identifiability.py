@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fitting.objective.forward import MuellerModel
 from fitting.objective.uncertainty import (
     Information,
     correlation_matrix,
@@ -196,7 +197,7 @@ def _cure(problem: Problem, solved: Solved, involved: Sequence[int]) -> str:
     """Return " or add ..." with the cheapest reading that would settle it, or nothing."""
     now = _worst(_stderr_with(problem, solved, None), involved)
     best, advice = now, ""
-    for text, extra in _possible(problem.observations):
+    for text, extra in _possible(problem.model, problem.observations):
         then = _worst(_stderr_with(problem, solved, extra), involved)
         # Another reading must pay clearly more than the one before it in the list
         if then < 0.5 * best:
@@ -208,7 +209,9 @@ def _worst(stderr: np.ndarray, involved: Sequence[int]) -> float:
     return float(max(stderr[i] for i in involved))
 
 
-def _possible(observations: Observations) -> list[tuple[str, Observations]]:
+def _possible(
+    model: MuellerModel, observations: Observations
+) -> list[tuple[str, Observations]]:
     """List what else could be read: other elements, or all at another incidence."""
     geometry = observations.geometry
     everywhere = np.unique(observations.at)
@@ -217,7 +220,7 @@ def _possible(observations: Observations) -> list[tuple[str, Observations]]:
             name,
             _readings(observations, geometry, np.full(everywhere.size, name), everywhere),
         )
-        for name in _CANDIDATES
+        for name in getattr(model, "candidates", _CANDIDATES)
         if name not in observations.names
     ]
     incidences = np.unique(geometry.theta_i.round(6))

@@ -1,6 +1,6 @@
 """Polarised reflectance of a surface whose roughness is no larger than the wavelength."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property, partial
 from typing import Any
 
@@ -274,15 +274,24 @@ class WaveModel:
 
     def with_method(self, method: str) -> "WaveModel":
         """Return the same surface by another form."""
-        return WaveModel(
-            self.material,
-            height_rms=self.height_rms,
-            corr_length=self.corr_length,
-            autocorrelation=self.autocorrelation,
-            psd=self.psd,
-            method=method,
-            exponent=self.exponent,
-        )
+        return WaveModel(**{**self._given, "method": method})
+
+    def with_heights(
+        self, height_rms: float | None = None, corr_length: float | None = None
+    ) -> "WaveModel":
+        """Return the same kind of surface with other heights, None as they are. [um]"""
+        given = {"height_rms": height_rms, "corr_length": corr_length}
+        changes = {name: value for name, value in given.items() if value is not None}
+        return WaveModel(**{**self._given, **changes})
+
+    def with_material(self, material: Material) -> "WaveModel":
+        """Return the same surface of something else."""
+        return WaveModel(**{**self._given, "material": material})
+
+    @property
+    def _given(self) -> dict[str, Any]:
+        """The arguments that made this model."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
 
     def energy(self, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike) -> Energy:
         """Account for unpolarised incident light, as shares of its power.

@@ -50,13 +50,16 @@ class Scattering:
         self._table: OrderTable | None = None
         self._phases: dict[tuple[float, float, float], Array] = {}
 
-    def matrices(self, columns: list[Array]) -> Array:
+    def matrices(self, columns: list[Array], *, retarded: bool = True) -> Array:
         """Mueller matrices as rows of 16.
 
         Parameters
         ----------
         columns : list of ndarray, each of N
             theta_i, theta_s, dphi [rad], wavelength [um], n, kappa.
+        retarded : bool
+            Whether s and p get the phase of the mean field, which takes most of the time
+            and changes only elements of U and V.
 
         Returns
         -------
@@ -69,7 +72,7 @@ class Scattering:
             return out
         spreads = self._spreads(columns[3])
         self._warn_of_slopes(spreads)
-        phases = self._retardance(columns)
+        phases = self._retardance(columns) if retarded else np.zeros((2, size))
         moments = self._moments(2 * np.pi / columns[3].min())
         plan = Plan(self.method.kernel, self.dimensions, self.method.shadowed)
         height = self.heights.height_rms

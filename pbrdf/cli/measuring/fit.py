@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from fitting.models.simulated import SimulatedModel
+    from fitting.models.waves import WaveSurface
     from pbrdf import Material, MicrofacetModel
 
 
@@ -33,6 +34,24 @@ def command(
             min=1e-3, max=10.0, help="Slope rms per axis, as `pbrdf statistics` gives."
         ),
     ] = None,
+    height_rms: Annotated[
+        float | None,
+        typer.Option(
+            "--height-rms-um",
+            min=1e-5,
+            max=1e3,
+            help="Rms height: the surface is seen by waves, in place of a slope.",
+        ),
+    ] = None,
+    corr_length: Annotated[
+        float | None,
+        typer.Option(
+            "--corr-length-um", min=1e-3, max=1e5, help="Its 1/e length, with it."
+        ),
+    ] = None,
+    reach: Annotated[
+        float, typer.Option(min=1.01, max=10.0, help="How far both may go, as a factor.")
+    ] = 2.0,
     kappa: options.Kappa = 0.0,
     material_file: options.MaterialFile = None,
     scene: Annotated[
@@ -80,6 +99,8 @@ def command(
 
     With --scene the surface is traced once, and everything is fitted to all its bounces.
     Several wavelengths have gains, albedos and index of their own and share the slope.
+    With --height-rms-um and --corr-length-um the surface is seen by waves, and --free may
+    name height_rms and corr_length.
     With --output writes a folder with fit.json, model.toml and scan.png, and of several
     wavelengths a model each, spectrum.csv and spectrum.png.
 
@@ -100,24 +121,25 @@ def command(
     from fitting.run import fit as fit_model
 
     with progress_bar("tracing") as progress:
-        model: MicrofacetModel | SimulatedModel
+        model: MicrofacetModel | SimulatedModel | WaveSurface
+        heights = height_rms, corr_length, reach
         if scene is None:
             material = read_material(n, kappa, material_file)
-            model = _analytic(material, slope_rms, shadowing)
+            model = _closed_form(material, slope_rms, shadowing, heights)
         else:
-            if n is not None or slope_rms is not None or material_file is not None:
-                msg = "--n and --slope-rms come from the --scene, got both. Leave one out."
+            alone = (n, slope_rms, material_file, height_rms, corr_length)
+            if any(value is not None for value in alone):
+                msg = (
+                    "--n and --slope-rms come from the --scene, and heights have no part "
+                    "in it, got both. Leave one out."
+                )
                 raise ValueError(msg)
-            model = _simulated(
-                scene,
-                measured.values(),
-                options.names(free),
-                n_rays=n_rays,
-                realizations=realizations,
-                seed=seed,
-                workers=workers,
-                progress=progress,
-            )
+            traced = {
+                "n_rays": n_rays, "realizations": realizations, "seed": seed,
+                "workers": workers, "progress": progress,
+            }  # fmt: skip
+            names = options.names(free)
+            model = _simulated(scene, measured.values(), names, **traced)
         result = fit_model(
             measured,
             model,
@@ -182,6 +204,39 @@ def _analytic(
     return MicrofacetModel(material, slope_rms=slope_rms, shadowing=shadowing)
 
 
+def _closed_form(
+    material: "Material | None",
+    slope_rms: float | None,
+    shadowing: str,
+    heights: tuple[float | None, float | None, float],
+) -> "MicrofacetModel | WaveSurface":
+    """Return the model to start from: by slope, or by height, length and reach."""
+    height_rms, corr_length, reach = heights
+    if height_rms is None and corr_length is None:
+        return _analytic(material, slope_rms, shadowing)
+    from fitting import WaveSurface
+    from pbrdf import WaveModel
+
+    given = {
+        "--n": material,
+        "--height-rms-um": height_rms,
+        "--corr-length-um": corr_length,
+    }
+    for option, value in given.items():
+        if value is None:
+            msg = f"{option} must be given where waves are fitted, got none."
+            raise ValueError(msg)
+    if slope_rms is not None:
+        msg = (
+            f"--slope-rms must be left out beside --height-rms-um, got {slope_rms:g}: "
+            "height and length make it."
+        )
+        raise ValueError(msg)
+    assert material is not None  # looked at above
+    model = WaveModel(material, height_rms=height_rms, corr_length=corr_length)
+    return WaveSurface(model, reach=reach)
+
+
 def _simulated(
     scene: Path, scans: "Iterable[xr.Dataset]", free: tuple[str, ...], **options: Any
 ) -> "SimulatedModel":
@@ -201,10 +256,14 @@ def _simulated(
 
 
 def _slope(
-    model: "MicrofacetModel | SimulatedModel", stderr: float
+    model: "MicrofacetModel | SimulatedModel | WaveSurface", stderr: float
 ) -> dict[str, tuple[float, float]]:
     """Return what is known of the slope."""
-    slope = (model if hasattr(model, "slope_rms") else model.model).slope_rms
+    of = model if hasattr(model, "slope_rms") else model.model
+    slope = getattr(of, "slope_rms", None)
+    if slope is None:
+        msg = "--slope-stderr needs a slope, got heights seen by waves. Leave it out."
+        raise ValueError(msg)
     if isinstance(slope, tuple):
         msg = "--slope-stderr needs an isotropic surface, got two slopes. Leave it out."
         raise ValueError(msg)
