@@ -1,4 +1,4 @@
-"""Make the pages that follow from the code: gallery, API reference, changelog.
+"""Make the pages that follow from the code: gallery, notebooks, API reference, changelog.
 
 Run by `make docs` before the site is built.
 """
@@ -12,6 +12,7 @@ import xarray as xr
 
 import data_io
 import pbrdf
+from docs.notebook_pages import NOTEBOOKS, page
 from fitting import surface_statistics
 from fitting.models.cuts import plane_curves
 from fitting.report.surface import surface_figure
@@ -43,6 +44,9 @@ def main() -> None:
         entries.append(f"## {title}\n\n`{command}`\n\n![{title}](gallery/{name}.png)\n")
     head = "# Gallery\n\nEvery kind of picture, drawn from small runs with this site.\n"
     (DOCS / "gallery.md").write_text("\n".join([head, *entries]), encoding="utf-8")
+    for notebook in sorted(NOTEBOOKS.glob("*.ipynb")):
+        text = page(notebook, DOCS / "gallery")
+        (DOCS / f"notebook_{notebook.stem}.md").write_text(text, encoding="utf-8")
     (DOCS / "api.md").write_text(reference(), encoding="utf-8")
     log = (DOCS.parent / "CHANGELOG.md").read_text(encoding="utf-8")
     (DOCS / "changelog.md").write_text(log, encoding="utf-8")

@@ -50,7 +50,7 @@ def surface_figure(
         figure, axes = new_figure(
             len(heights), columns, (inches, sum(heights)), height_ratios=heights
         )
-        figure.set_layout_engine("constrained", w_pad=0.06)
+        figure.set_layout_engine("constrained", w_pad=0.11)
         panels = iter(axes.flat)
         _draw_surface(next(panels), found)
         if mends:

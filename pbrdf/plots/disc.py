@@ -80,7 +80,7 @@ def colour_bar(figure: "Figure", axes: list[Any], image: Any, look: Any) -> None
         aspect=22 if count == 1 else 18 * count, pad=0.03, **options,
     )  # fmt: skip
     bar.outline.set_linewidth(0.4)
-    _few_ticks(bar, norm, "ticks" in options and norm.vmax != _AOLP_END, 3 * count)
+    _few_ticks(bar, norm, "ticks" in options and norm.vmax != _AOLP_END, count)
 
 
 def _hatch(axis: Any, azimuth: np.ndarray, zenith: np.ndarray, cells: np.ndarray) -> None:
@@ -106,8 +106,8 @@ def _hatch(axis: Any, azimuth: np.ndarray, zenith: np.ndarray, cells: np.ndarray
     )  # fmt: skip
 
 
-def _few_ticks(bar: Any, norm: Any, symmetric: bool, room: int) -> None:
-    """Keep as many ticks as there is room for."""
+def _few_ticks(bar: Any, norm: Any, symmetric: bool, panels: int) -> None:
+    """Keep as many ticks as there is room for below so many panels."""
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
@@ -118,17 +118,17 @@ def _few_ticks(bar: Any, norm: Any, symmetric: bool, room: int) -> None:
         return f"${'-' if value < 0 else ''}10^{{{exponent}}}$"
 
     if symmetric:
-        positive = [t for t in bar.get_ticks() if t >= norm.linthresh][-(room // 3) :]
+        positive = [t for t in bar.get_ticks() if t >= norm.linthresh][-panels:]
         kept = sorted({0.0, *positive, *([-t for t in positive] if norm.vmin < 0 else [])})
         bar.set_ticks(kept)
         bar.formatter = FuncFormatter(power)
         bar.update_ticks()
     elif isinstance(norm, LogNorm):
-        bar.locator = LogLocator(numticks=room)
+        bar.locator = LogLocator(numticks=2 * panels + 1)
         bar.formatter = FuncFormatter(power)
         bar.update_ticks()
     elif norm.vmax != _AOLP_END:
-        bar.locator = MaxNLocator(room)
+        bar.locator = MaxNLocator(2 * panels + 1)
         bar.update_ticks()
         bar.formatter.set_powerlimits((-3, 4))
     bar.ax.xaxis.set_minor_locator(NullLocator())

@@ -39,7 +39,8 @@ def test_the_sdist_is_whole(built):
     with tarfile.open(next(built.glob("*.tar.gz"))) as archive:
         held = {"/".join(name.split("/")[1:]) for name in archive.getnames()}
     for name in (
-        "docs/quick_start.md", "examples/demo.py", "tests/test_layers.py", "Makefile",
+        "docs/quick_start.md", "examples/demo.py", "examples/notebooks/fit_a_scan.ipynb",
+        "tests/test_layers.py", "Makefile",
         "locks/run.lock", "CITATION.cff", "CHANGELOG.md", "pbrdf/optics/tables",
         "fitting/report/viewer.js",
     ):  # fmt: skip
