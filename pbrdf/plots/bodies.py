@@ -74,7 +74,7 @@ def scene_picture(
         on = f", {' and '.join(what)} on {100 * share:.2g} % of the picture" if what else ""
         apart = " " if inches > _WIDE else "\n"
         axis.set_title(f"surface{on};{apart}one scale for lengths and heights")
-        lay_out(figure)
+    lay_out(figure)
     return figure
 
 

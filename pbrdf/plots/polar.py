@@ -114,8 +114,8 @@ def hemisphere(
             if line
         )
         figure.suptitle(heading)
-        # Its ticks are the same at any size
-        lay_out(figure, rounds=1)
+    # Its ticks are the same at any size
+    lay_out(figure, rounds=1)
     return figure
 
 

@@ -53,7 +53,7 @@ def scan_figure(
 
     with rc_context(small()):
         figure = _drawn(measured, curves, width(width_mm))
-        lay_out(figure)
+    lay_out(figure)
     return figure
 
 
@@ -84,9 +84,15 @@ def _drawn(measured: xr.Dataset, curves: xr.Dataset | None, inches: float) -> "F
             _draw_residuals(axes[per * row + 1, column], name, scan, curve)
             upper.tick_params(labelbottom=False)
         _draw_points(upper, name, scan)
-        upper.set_title(f"{names[name]}, {title}")
+        upper.set_title(f"{names[name]}" + ("\n" if columns > 1 else ", ") + title)
         if name == "M00" and _spans_decades(scan[name].values):
-            upper.set_yscale("log")
+            # Down to the readings: a model may fall for ever
+            lit = scan[name].values[scan[name].values > 0.0]
+            upper.set(yscale="log", ylim=(0.3 * lit.min(), None))
+        if name == "m10":
+            # Where there is no light, noise over noise is no polarisation
+            low, high = upper.get_ylim()
+            upper.set_ylim(max(low, -1.1), min(high, 1.1))
     for axis in axes.flat:
         axis.set(xlim=(-90, 90), xticks=range(-90, 91, 45))
     for axis in axes[-1]:

@@ -59,7 +59,8 @@ def lay_out(figure: "Figure", rounds: int = 2) -> None:
     """Give each part its place for good; at every saving it would take longer than drawing.
 
     Ticks are chosen for the place that an axis has, so that what is labelled by them needs
-    two rounds.
+    two rounds. Call it under the settings that the figure is saved under, out of those of
+    `small`.
     """
     for _ in range(rounds):
         figure.draw_without_rendering()
