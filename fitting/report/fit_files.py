@@ -84,11 +84,19 @@ def _distinct(result: "FitResult") -> dict[str, Any]:
     for key, model in result.models.items():
         # Of a simulated surface the analytical model that it corrects
         analytic = model if _of_waves(model) else getattr(model, "model", model)
-        if all(analytic != other for other in models.values()):
+        if not any(_equal(analytic, other) for other in models.values()):
             models[key] = analytic
     if len(models) == 1:
         return {"model.toml": next(iter(models.values()))}
     return {f"model_{_words(key)}.toml": model for key, model in models.items()}
+
+
+def _equal(one: Any, other: Any) -> bool:
+    """Whether two models are the same."""
+    if not _of_waves(one):
+        return bool(one == other)
+    pairs = [(model.beside, model.model.given) for model in (one, other)]
+    return pairs[0] == pairs[1]
 
 
 def _of_waves(model: Any) -> bool:

@@ -274,7 +274,7 @@ class WaveModel:
 
     def with_method(self, method: str) -> "WaveModel":
         """Return the same surface by another form."""
-        return WaveModel(**{**self._given, "method": method})
+        return WaveModel(**{**self.given, "method": method})
 
     def with_heights(
         self, height_rms: float | None = None, corr_length: float | None = None
@@ -282,15 +282,15 @@ class WaveModel:
         """Return the same kind of surface with other heights, None as they are. [um]"""
         given = {"height_rms": height_rms, "corr_length": corr_length}
         changes = {name: value for name, value in given.items() if value is not None}
-        return WaveModel(**{**self._given, **changes})
+        return WaveModel(**{**self.given, **changes})
 
     def with_material(self, material: Material) -> "WaveModel":
         """Return the same surface of something else."""
-        return WaveModel(**{**self._given, "material": material})
+        return WaveModel(**{**self.given, "material": material})
 
     @property
-    def _given(self) -> dict[str, Any]:
-        """The arguments that made this model."""
+    def given(self) -> dict[str, Any]:
+        """The arguments that make this model."""
         return {one.name: getattr(self, one.name) for one in fields(self)}
 
     def energy(self, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike) -> Energy:
