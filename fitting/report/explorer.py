@@ -1,5 +1,6 @@
 """A page that explains any result: summary, hemisphere, fits, glossary, origin, data."""
 
+import json
 import shlex
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
@@ -11,6 +12,7 @@ import xarray as xr
 
 from fitting.report import html
 from fitting.report.layers import fitted_layers, layers_of, light, with_readings
+from fitting.report.swept import points, swept
 from fitting.report.viewer import hemisphere_view
 from fitting.result.misfit import RULE
 from pbrdf import __version__
@@ -63,7 +65,7 @@ def sections_of(result: xr.Dataset, name: str) -> Iterator[str]:
         )
         if isinstance(result.attrs.get(key), Mapping)
     }  # fmt: skip
-    sentences = [_what(result), _how_sure(result)]
+    sentences = [_what(result), *swept(result), _how_sure(result)]
     if fits:
         sentences = [*fit_summary(fits), sentences[-1]]
     yield html.section("Summary", html.paragraph(" ".join(sentences)), facts(result, name))
@@ -73,8 +75,9 @@ def sections_of(result: xr.Dataset, name: str) -> Iterator[str]:
             layers = layers_of(result)
         else:
             layers = with_readings(layers, scan_of(result))
+        tables = [cuts(result), *([points(result)] if "design" in result.attrs else [])]
         yield html.section(
-            "Hemisphere", hemisphere_view(layers), html.download(*cuts(result))
+            "Hemisphere", hemisphere_view(layers), *(html.download(*one) for one in tables)
         )
     for title, fit in fits.items():
         yield html.section(f"{title} fit", *_fit(fit))
@@ -133,7 +136,7 @@ def facts(result: xr.Dataset, name: str) -> str:
     rows = [
         ("sample", name),
         ("report written", f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"),
-        ("scene", scene_of(result) or "not recorded"),
+        ("scene", scene_of(result) or result.attrs.get("source", "not recorded")),
     ]
     if "theta_i" in result.coords:
         angles = np.rad2deg(np.unique(result.theta_i.values))
@@ -168,8 +171,12 @@ def origin(record: Any, result: xr.Dataset | None = None) -> str:
             "" if result is None else f" Seed {result.attrs.get('seed', 'not recorded')}."
         )
         scene = "" if result is None else str(result.attrs.get("scene", ""))
+        if result is not None and isinstance(result.attrs.get("sweep"), Mapping):
+            scene = json.dumps(result.attrs["sweep"], indent=2)
         text = f"<pre>{escape(scene)}</pre>" if scene else ""
         told = html.paragraph(f"Simulated from the scene below.{seed}")
+        if result is not None and "design" in result.attrs:
+            told = html.paragraph("Computed by `pbrdf sweep` from what stands below.")
         return html.section("How to make it again", told, text)
     files = [
         (one["role"], one["name"], one.get("sha256", "an entry of a database"))

@@ -12,7 +12,8 @@ def command(
     source: Annotated[
         Path,
         typer.Argument(
-            help="Result (.nc, .zarr), or a folder that holds one.", show_default=False
+            help="Result or sweep (.nc, .zarr), or a folder that holds one.",
+            show_default=False,
         ),
     ],
     output: options.Output = None,
@@ -25,11 +26,14 @@ def command(
     import data_io
     from fitting.report.explorer import page_of
     from pbrdf.cli.staging import staged_file
+    from pbrdf.stored import is_sweep_store, read_sweep
 
-    one = not source.is_dir() or data_io.is_result_store(source)
+    swept = is_sweep_store(source)
+    one = swept or not source.is_dir() or data_io.is_result_store(source)
     file = source if one else _result_in(source)
     with staged_file(output or file.with_suffix(".html"), force=force) as stage:
-        page = page_of(data_io.read_result(file), file.name)
+        result = read_sweep(file) if swept else data_io.read_result(file)
+        page = page_of(result, file.name)
         stage.write_text(page, encoding="utf-8")
     typer.echo(f"Report: {output or file.with_suffix('.html')}")
 
