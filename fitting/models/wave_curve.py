@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["HEIGHTS", "WaveCurve"]
 
 HEIGHTS = ("height_rms", "corr_length")
-# Degrees in height and length that are tried, and the error in parts of M00 that is
-# enough. The phases of U and V take long
-_DEGREES, _OF_PHASES, _ENOUGH = (5, 8, 12, 17), (4, 7), 1e-4
+# Degrees in height and length that are tried, and the error in parts of M00 that is enough
+_DEGREES, _ENOUGH = (5, 8, 12, 17), 1e-4
 # Places at which the curve is compared with the model, and the part of the brightest
 # reading below which one does not count
 _PLACES, _DARK = 8, 1e-9
@@ -106,8 +105,7 @@ class WaveCurve:
         indices = None if grid is None else _some_indices(grid, rng)
         truth = [exact.at(place, indices) for place in places]
         error = np.inf
-        degrees = _OF_PHASES if exact.retarded else _DEGREES
-        for degree in degrees if vary else (0,):
+        for degree in _DEGREES if vary else (0,):
             fitted = _solved(vary, grid, degree, exact)
             finer = cls(vary, grid, degree, exact.elements, *fitted)
             left = max(

@@ -51,8 +51,8 @@ class WaveSurface:
         If the reach is not above 1 or the index lies outside its range.
     """
 
-    # What a fit asks for that wonders which element to measure next: no phases, which take
-    # a minute
+    # What a fit asks for that wonders which element to measure next: none of U and V, which
+    # take their time
     candidates = ("M00", "M10")
 
     model: "WaveModel"

@@ -4,6 +4,7 @@ import os
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from pbrdf.kernels.wave.scatter import Plan, fill_scattering
 from pbrdf.wave.coherent import MeanField, Medium, mean_field
 from pbrdf.wave.methods import method_of
 from pbrdf.wave.order_table import OrderTable
-from pbrdf.wave.statistics import Statistics
+from pbrdf.wave.statistics import Exponential, Gaussian, Statistics
 
 __all__ = ["Scattering"]
 
@@ -198,13 +199,45 @@ class Scattering:
         for j, kind in enumerate(kinds):
             key = (float(kind[0]), float(kind[1]), float(kind[2]))
             if key not in self._phases:
-                means = [self._mean(float(theta), *key) for theta in PHASE_ZENITHS]
-                self._phases[key] = np.array([mean.retardance for mean in means])
+                self._phases[key] = self._retardances(*key)
             rows = where.ravel() == j
             for side in (0, 1):
                 zeniths = columns[side][rows]
                 phases[side, rows] = np.interp(zeniths, PHASE_ZENITHS, self._phases[key])
         return phases
+
+    def _retardances(self, wavelength: float, n: float, kappa: float) -> Array:
+        """Phases at `PHASE_ZENITHS`, which go with the square of the height."""
+        k, heights = 2 * np.pi / wavelength, self.heights
+        if isinstance(heights, Gaussian | Exponential):
+            shape = type(heights), k * heights.corr_length, self.dimensions
+            unit = unit_retardances(*shape, n, kappa)
+            return (k * heights.height_rms) ** 2 * unit
+        means = [
+            self._mean(float(zenith), wavelength, n, kappa) for zenith in PHASE_ZENITHS
+        ]
+        return np.array([mean.retardance for mean in means])
+
+
+@lru_cache(maxsize=4096)
+def unit_retardances(
+    law: type[Gaussian | Exponential],
+    length: float,
+    dimensions: int,
+    n: float,
+    kappa: float,
+) -> Array:
+    """Phases at `PHASE_ZENITHS` over (k h)², of heights of length k l."""
+    heights = law(1.0, length)
+    means = (
+        mean_field(
+            min(float(np.sin(zenith)), LARGEST_SINE), Medium.of(n, kappa), 1.0, length,
+            partial(heights.spectrum, dimensions=dimensions), dimensions=dimensions,
+            bounded=heights.bounded,
+        )
+        for zenith in PHASE_ZENITHS
+    )  # fmt: skip
+    return np.array([mean.retardance for mean in means])
 
 
 def normal_and_lateral(columns: list[Array]) -> tuple[Array, Array]:
