@@ -210,8 +210,8 @@ class Scattering:
         """Phases at `PHASE_ZENITHS`, which go with the square of the height."""
         k, heights = 2 * np.pi / wavelength, self.heights
         if isinstance(heights, Gaussian | Exponential):
-            shape = type(heights), k * heights.corr_length, self.dimensions
-            unit = unit_retardances(*shape, n, kappa)
+            length = k * heights.corr_length
+            unit = unit_retardances(type(heights), length, self.dimensions, n, kappa)
             return (k * heights.height_rms) ** 2 * unit
         means = [
             self._mean(float(zenith), wavelength, n, kappa) for zenith in PHASE_ZENITHS
