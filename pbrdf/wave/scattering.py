@@ -9,6 +9,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from pbrdf.errors import AccuracyWarning
+from pbrdf.kernels.wave import orders
 from pbrdf.kernels.wave.orders import fill_moments
 from pbrdf.kernels.wave.scatter import Plan, fill_scattering
 from pbrdf.wave.coherent import MeanField, Medium, mean_field
@@ -28,6 +29,8 @@ STEEPEST = 0.45
 SLOPED = ("auto", "order-weighted", "local-curvature")
 # Zeniths at which the phase of the mean field is found; it is smooth between them
 PHASE_ZENITHS = np.r_[np.linspace(0.0, 0.5 * np.pi, 19)[:-1], np.deg2rad(89.5)]
+# Heights that are told by height and length alone
+LAWS = {orders.GAUSSIAN: Gaussian, orders.EXPONENTIAL: Exponential}
 # The mean field of grazing incidence proper is that of a mirror
 LARGEST_SINE = 1.0 - 1e-12
 
@@ -209,9 +212,9 @@ class Scattering:
     def _retardances(self, wavelength: float, n: float, kappa: float) -> Array:
         """Phases at `PHASE_ZENITHS`, which go with the square of the height."""
         k, heights = 2 * np.pi / wavelength, self.heights
-        if isinstance(heights, Gaussian | Exponential):
+        if heights.law in LAWS:
             length = k * heights.corr_length
-            unit = unit_retardances(type(heights), length, self.dimensions, n, kappa)
+            unit = unit_retardances(heights.law, length, self.dimensions, n, kappa)
             return (k * heights.height_rms) ** 2 * unit
         means = [
             self._mean(float(zenith), wavelength, n, kappa) for zenith in PHASE_ZENITHS
@@ -221,14 +224,14 @@ class Scattering:
 
 @lru_cache(maxsize=4096)
 def unit_retardances(
-    law: type[Gaussian | Exponential],
+    law: int,
     length: float,
     dimensions: int,
     n: float,
     kappa: float,
 ) -> Array:
     """Phases at `PHASE_ZENITHS` over (k h)², of heights of length k l."""
-    heights = law(1.0, length)
+    heights = LAWS[law](1.0, length)
     means = (
         mean_field(
             min(float(np.sin(zenith)), LARGEST_SINE), Medium.of(n, kappa), 1.0, length,
