@@ -27,6 +27,9 @@ class Result:
 
     def __init__(self, dataset: xr.Dataset) -> None:
         needed = {"brdf", "brdf_stderr", "albedo_stderr", "projected_solid_angle"}
+        if "brdf_total_stderr" in dataset:
+            # A surface out of a store has the sum over bounces alone
+            needed -= {"brdf", "brdf_stderr"}
         missing = sorted(needed - set(map(str, dataset.data_vars)))
         if missing or "theta_i" not in dataset.coords:
             msg = (

@@ -173,9 +173,11 @@ class StoredBRDF:
         self,
         theta_i: npt.ArrayLike | None = None,
         wavelength: npt.ArrayLike | None = None,
+        *,
+        interpolated: bool = True,
         **parameters: Any,
     ) -> xr.Dataset:
-        """Return one surface of the store as a result: brdf_total and its standard error.
+        """Return one surface of the store as a result, also for `pbrdf.signature`.
 
         Parameters
         ----------
@@ -183,8 +185,19 @@ class StoredBRDF:
             Incidences; those of the store without it. [rad]
         wavelength : array_like, optional
             Those of the store without it. [um]
+        interpolated : bool
+            Whether standard errors hold the error of interpolation, as it is measured by
+            leaving out points, beside that of the simulation. Measuring it reads more of
+            the store.
         **parameters : number or str
             As of `brdf`, one value each.
+
+        Returns
+        -------
+        Dataset
+            brdf_total, its standard error, and albedo_stderr: that of the sum over the
+            hemisphere if errors of interpolation are alike everywhere and those of the
+            simulation independent.
         """
         data = self._contents.dataset
         incidences = np.atleast_1d(self._theta_i if theta_i is None else theta_i)
@@ -192,12 +205,16 @@ class StoredBRDF:
         waves = None if known is None else known.nodes if wavelength is None else wavelength
         grid = np.meshgrid(incidences, data.theta_s, data.dphi, indexing="ij")
         each = [None] if waves is None else np.atleast_1d(waves).tolist()
-        found = [self._evaluated(tuple(grid), one, parameters, error=False) for one in each]
+        found = [
+            self._evaluated(tuple(grid), one, parameters, error=interpolated)
+            for one in each
+        ]
         dims = list(RESULT_VARIABLES["brdf_total"].dims)
         dims = [
             d for d in dims if d != "phi_i" and (d != "wavelength" or waves is not None)
         ]
-        pair = [np.stack([one[k] for one in found], axis=1) for k in (0, 1)]
+        value, noise, between = (np.stack(one, axis=1) for one in zip(*found, strict=True))
+        pair = [value, np.hypot(noise, between)]
         pair = pair if waves is not None else [one[:, 0] for one in pair]
         names = ("brdf_total", "brdf_total_stderr")
         coords: dict[str, Any] = {"theta_i": incidences, "theta_s": data.theta_s.values}
@@ -215,6 +232,10 @@ class StoredBRDF:
             variable.attrs = {"units": entry.units, "long_name": entry.long_name}
         weight = data.projected_solid_angle.load()
         out["projected_solid_angle"] = (weight.dims, weight.to_numpy(), dict(weight.attrs))
+        total = _of_albedo(noise[..., 0, 0], between[..., 0, 0], weight.to_numpy())
+        about = {"units": "1", "long_name": RESULT_VARIABLES["albedo_stderr"].long_name}
+        of = ("theta_i", "wavelength") if waves is not None else ("theta_i",)
+        out["albedo_stderr"] = (of, total if waves is not None else total[:, 0], about)
         told = ", ".join(f"{name}={value}" for name, value in parameters.items())
         out.attrs = {"store": self._contents.path.name, "interpolated_at": told}
         return out
@@ -230,7 +251,7 @@ class StoredBRDF:
         """Draw elements over the hemisphere at one incidence [rad] and point."""
         from pbrdf.plots import hemisphere
 
-        here = self.at(theta_i, wavelength, **parameters)
+        here = self.at(theta_i, wavelength, interpolated=False, **parameters)
         places = {"theta_i": theta_i}
         places |= {} if wavelength is None else {"wavelength": wavelength}
         return hemisphere(here, elements, fold=False, places=places)
@@ -392,6 +413,14 @@ class StoredBRDF:
                 nodes, lambda scheme: incidence_trial(self._lobes(value, stderr, scheme))
             )
         return found
+
+
+def _of_albedo(noise: np.ndarray, between: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Error of the sum over the hemisphere (..., theta_s, dphi) of errors of M00."""
+    independent = np.sum((noise * weight) ** 2, axis=(-2, -1))
+    alike = np.sum(between * weight, axis=(-2, -1))
+    found: np.ndarray = np.sqrt(independent + alike**2)
+    return found
 
 
 def _measure(

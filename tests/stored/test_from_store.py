@@ -112,6 +112,34 @@ def test_interpolation_respects_the_lobe(store: Path) -> None:
     assert miss < 0.3 * plain_miss
 
 
+def test_a_surface_of_the_store_under_the_sun(store: Path) -> None:
+    """Between the points of the sweep, against a simulation there; the error holds it."""
+    scene = pbrdf.Scene(
+        pbrdf.GaussianSurface(shape=(48, 48), spacing=1.0, corr_length=5.0, slope_rms=0.18),
+        pbrdf.Material(1.6, 0.05),
+    )
+    view = np.deg2rad(40.0)
+    truth = pbrdf.simulate(
+        scene, [view], phi_i="uniform", n_rays=4000, realizations=32, seed=7, n_theta=30,
+        n_dphi=60,
+    )  # fmt: skip
+    source = pbrdf.from_store(store)
+    sun = pbrdf.signatures.Sun(theta=0.55, phi=np.pi - 0.2)
+    there = {"theta_s": view, "sun": sun, "phi_s": 0.1}
+    wanted = pbrdf.signature(truth, **there)
+    found = pbrdf.signature(source.at(view, slope_rms=0.18, n=1.6), **there)
+    noise = pbrdf.signature(
+        source.at(view, interpolated=False, slope_rms=0.18, n=1.6), **there
+    )
+    assert_allclose(found.radiance, noise.radiance, rtol=1e-12)
+    apart = abs(found.radiance - wanted.radiance)
+    error = np.hypot(found.radiance_stderr, wanted.radiance_stderr)
+    assert (apart <= 3 * error + 1e-12).all()
+    assert (found.radiance_stderr[..., :3] > noise.radiance_stderr[..., :3]).all()
+    # An error that holds anything would say nothing
+    assert float(error[..., 0].max()) < 0.15 * float(wanted.radiance[..., 0].max())
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
