@@ -41,6 +41,9 @@ NOTHING = 1e-13
 # Bins darker than this part of the brightest get fewer looks, and below this part none:
 # there Smith's rule stands, with an error as large as what it hides
 DARK, DARKEST = 0.1, 1e-5
+# Slope rms below which rays do: all their light falls into a bin or two, and the panels of
+# the integral are as many as one over its square
+NARROWEST = 1e-3
 # Azimuths over which a spread source is averaged: from so many, doubled up to so many
 FEW_AZIMUTHS, MANY_AZIMUTHS = 8, 256
 
@@ -57,6 +60,7 @@ def without_rays(
         or plan.base.shape[1] > 0
         or len(plan.n) >= WORTHWHILE
         or plan.half_angle > 0.0
+        or min(surface.facet_slope_rms) < NARROWEST
     ):
         return None
     return [SingleBounce.of(surface, one) for one in plans]
