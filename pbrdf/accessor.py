@@ -36,7 +36,16 @@ class Accessor:
         self._dataset = dataset
 
     def element(self, name: str) -> xr.DataArray:
-        """M00 ... M33 [1/sr], DOLP [1] or AOLP [rad], all bounces."""
+        """M00 ... M33 [1/sr], DOLP [1] or AOLP [rad], all bounces.
+
+        Examples
+        --------
+        >>> from pbrdf import HeightMap, Material, Scene, simulate
+        >>> glass = Scene(HeightMap.flat(), Material(1.5))
+        >>> ds = simulate(glass, [0.5, 0.7], n_rays=320, n_theta=9, n_dphi=4)
+        >>> ds.pbrdf.element("M10").sizes["dphi"]
+        4
+        """
         return derived.element(self._dataset, name).value
 
     def stderr(self, name: str) -> xr.DataArray | None:
@@ -59,6 +68,14 @@ class Accessor:
         -------
         DataArray
             NaN where no light was found. Noise lifts it: see `stderr("DOLP")`.
+
+        Examples
+        --------
+        >>> from pbrdf import HeightMap, Material, Scene, simulate
+        >>> glass = Scene(HeightMap.flat(), Material(1.5))
+        >>> ds = simulate(glass, [0.5, 0.7], n_rays=320, n_theta=9, n_dphi=4)
+        >>> round(float(ds.isel(theta_i=1).pbrdf.dolp().max()), 2)
+        0.69
         """
         return derived.element(self._dataset, "DOLP", source).value
 
@@ -67,6 +84,14 @@ class Accessor:
 
         Measured from e_s, perpendicular to the meridian plane of the scattered light,
         towards e_p; 0 is s-polarised. NaN where the light is not polarised or not there.
+
+        Examples
+        --------
+        >>> from pbrdf import HeightMap, Material, Scene, simulate
+        >>> glass = Scene(HeightMap.flat(), Material(1.5))
+        >>> ds = simulate(glass, [0.5, 0.7], n_rays=320, n_theta=9, n_dphi=4)
+        >>> float(ds.isel(theta_i=1).pbrdf.aolp().max())
+        0.0
         """
         return derived.element(self._dataset, "AOLP", source).value
 
@@ -77,11 +102,31 @@ class Accessor:
         ----------
         source : array_like, shape (4,)
             (I, Q, U, V) with I > 0, in the meridian frame of the incident beam.
+
+        Examples
+        --------
+        >>> from pbrdf import HeightMap, Material, Scene, simulate
+        >>> glass = Scene(HeightMap.flat(), Material(1.5))
+        >>> ds = simulate(glass, [0.5, 0.7], n_rays=320, n_theta=9, n_dphi=4)
+        >>> seen = ds.isel(theta_i=1).pbrdf.stokes([1.0, -1.0, 0.0, 0.0])
+        >>> bool(seen.sel(stokes_out="Q").min() < 0)
+        True
         """
         return derived.light(self._dataset, source)
 
     def in_plane(self) -> xr.Dataset:
-        """Cut in the plane of incidence, dimension `theta_view`, positive forward. [rad]"""
+        """Cut in the plane of incidence, dimension `theta_view`, positive forward. [rad]
+
+        Examples
+        --------
+        >>> from pbrdf import HeightMap, Material, Scene, simulate
+        >>> glass = Scene(HeightMap.flat(), Material(1.5))
+        >>> ds = simulate(glass, [0.5, 0.7], n_rays=320, n_theta=9, n_dphi=4)
+        >>> lit = ds.isel(theta_i=0).pbrdf.in_plane().brdf_total.sel(stokes_out="I")
+        >>> brightest = lit.sel(stokes_in="I").idxmax("theta_view")
+        >>> round(float(brightest), 2)
+        0.44
+        """
         return derived.in_plane(self._dataset)
 
     def at(self, **places: float) -> xr.Dataset:
@@ -107,6 +152,14 @@ class Accessor:
         -----
         AccuracyWarning
             If neighbours differ by more than a tenth of the peak.
+
+        Examples
+        --------
+        >>> from pbrdf import HeightMap, Material, Scene, simulate
+        >>> glass = Scene(HeightMap.flat(), Material(1.5))
+        >>> ds = simulate(glass, [0.5, 0.7], n_rays=320, n_theta=9, n_dphi=4)
+        >>> ds.pbrdf.at(theta_i=0.7).attrs["interpolation"]
+        'theta_i: as computed at 40.107 deg'
         """
         return derived.interpolate(self._dataset, places)
 
@@ -121,6 +174,16 @@ class Accessor:
             Averaged over each bin, with cos(theta) dOmega; its errors are 0.
         name : str
             Of the model; the result is named "simulated".
+
+        Examples
+        --------
+        >>> from pbrdf import HeightMap, Material, Scene, simulate
+        >>> glass = Scene(HeightMap.flat(), Material(1.5))
+        >>> ds = simulate(glass, [0.5, 0.7], n_rays=320, n_theta=9, n_dphi=4)
+        >>> from pbrdf import MicrofacetModel
+        >>> both = ds.pbrdf.beside(MicrofacetModel(Material(1.5), slope_rms=0.1))
+        >>> both.state.values.tolist()
+        ['simulated', 'model']
         """
         return derived.beside(self._dataset, model, name)
 

@@ -191,11 +191,12 @@ def _sentence(error: Exception) -> str:
 
 def _usage(error: typer.TyperException, arguments: Sequence[str]) -> str:
     """Return what is wrong with the arguments, the value, and where help is."""
-    sentence = _sentence(error)
+    sentence = _sentence(error).replace("Value error, ", "")
     option = re.search(r"'(--[a-z-]+)'", sentence)
     if option and option[1] in arguments[:-1]:
         value = arguments[arguments.index(option[1]) + 1]
-        sentence = f"{sentence.rstrip('.')}, got {value!r}."
+        if repr(value) not in sentence:
+            sentence = f"{sentence.rstrip('.')}, got {value!r}."
     name = _command_of(arguments)
     return f"{sentence} See `pbrdf {f'{name} ' if name else ''}--help`."
 
