@@ -201,7 +201,8 @@ class _Exact:
             # Corners of the ranges may be steep; the fitted model tells of its own slope
             warnings.simplefilter("ignore", AccuracyWarning)
             surface = self.model.with_heights(**heights).surface
-            rows = surface.matrices(columns, retarded=self.retarded)
+            azimuth = np.tile(where.phi_i, len(kinds))
+            rows = surface.matrices(columns, retarded=self.retarded, phi_i=azimuth)
         rows = rows.reshape(len(kinds), where.size, 16)
         m00 = rows[0, :, 0] + _LEAST
         wanted = rows[min(1, len(kinds) - 1) :, :, list(self.elements)] / m00[:, None]

@@ -36,8 +36,8 @@ class WaveSurface:
     ----------
     model : WaveModel
         Start values of height_rms, corr_length and the index, and the kind of
-        autocorrelation. One given as a spectrum or a table keeps its shape: its height and
-        length are held.
+        autocorrelation. One given as a spectrum or a table, or by two lengths, keeps its
+        shape: its height and length are held.
     reach : float
         Height and length may go up and down by this factor from the start. [1]
     index_range : ((n, n), (kappa, kappa)), optional
@@ -87,7 +87,8 @@ class WaveSurface:
 
     @property
     def _parametric(self) -> bool:
-        return self.model.psd is None and isinstance(self.model.autocorrelation, str)
+        named = self.model.psd is None and isinstance(self.model.autocorrelation, str)
+        return named and self.model.directional is None
 
     @property
     def bounds(self) -> Mapping[str, Range]:
@@ -160,10 +161,9 @@ class WaveSurface:
         """Return the Mueller BRDF without the specular beam, (..., 4, 4). [1/sr]
 
         Of the model itself, not of the interpolation; arguments as of `WaveModel.brdf`.
-        An isotropic surface looks the same from every azimuth `phi_i`.
         """
-        del phi_i
-        found = self.specular_gain * self.model.brdf(theta_i, theta_s, dphi, wavelength)
+        light = self.model.brdf(theta_i, theta_s, dphi, wavelength, phi_i=phi_i)
+        found = self.specular_gain * light
         found[..., 0, 0] += self.diffuse_albedo / np.pi
         return found
 
@@ -182,11 +182,13 @@ class WaveSurface:
         # Of the scan itself; later questions are about what else might be read
         where, error_of_curve = self.asked[0]
         angles = where.theta_i, where.theta_s, where.dphi, where.wavelength
-        error = float(np.median(self.model.error_estimate(*angles)))
-        found = [
-            f"wave optics of this surface is itself known to {100 * error:.2g} % of M00 "
-            "in the median reading, which is no part of the standard errors"
-        ]
+        found = []
+        if self.model.directional is None:
+            error = float(np.median(self.model.error_estimate(*angles)))
+            found.append(
+                f"wave optics of this surface is itself known to {100 * error:.2g} % of "
+                "M00 in the median reading, which is no part of the standard errors"
+            )
         if error_of_curve > _ROUGH:
             found.append(
                 "the curve through waves errs by up to "

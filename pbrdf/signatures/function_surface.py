@@ -46,12 +46,13 @@ class FunctionSurface:
         rel_error: float,
     ) -> None:
         from pbrdf.analytic.microfacet import MicrofacetModel
+        from pbrdf.wave import WaveModel
 
         self.source = source
         self.theta, self.phi, self.wavelength = theta, phi, wavelength
         self.rel_error = rel_error
         # Only this model depends on where the x axis of the surface lies
-        self.oriented = isinstance(source, MicrofacetModel)
+        self.oriented = isinstance(source, MicrofacetModel | WaveModel)
         self.beam = np.zeros((4, 4))
         if hasattr(source, "coherent"):
             self.beam = np.asarray(source.coherent(theta, wavelength))

@@ -12,6 +12,7 @@ from pbrdf.errors import require
 from pbrdf.optics import library
 from pbrdf.optics.materials import Material
 from pbrdf.wave.accuracy import relative_error
+from pbrdf.wave.directional import Directional, directional_heights
 from pbrdf.wave.energy import Energy, account, hemisphere
 from pbrdf.wave.local_curvature import profile_curvature
 from pbrdf.wave.methods import method_of
@@ -33,7 +34,8 @@ class WaveModel:
     material : Material or str
         What is below the surface, or the name of a material of the library.
     height_rms, corr_length : float
-        Rms height and 1/e length of the autocorrelation. [um]
+        Rms height and 1/e length of the autocorrelation; (l_x, l_y) of a Gaussian one that
+        differs along the axes, for "first-order", "kirchhoff" and "small-slope". [um]
     autocorrelation : str, callable or (lag, correlation)
         "gaussian", "exponential", "k-correlation" (with `exponent`), a function of the lag
         [um] that is 1 at zero, or a table; corr_length then follows from it.
@@ -41,7 +43,9 @@ class WaveModel:
         Measured two-sided spectral density over frequencies without 2 pi [1/um];
         height_rms and corr_length follow from it. `brdf` and `coherent` read it as that of
         the isotropic surface, whose integral over the plane of frequencies is height_rms^2
-        [um^4]; `profile_scattering` and `profile_coherent` as that of the profile [um^3].
+        [um^4]; (f_x, f_y, density) is that over the plane of frequencies, for
+        "first-order". `profile_scattering` and `profile_coherent` read it as that of the
+        profile [um^3].
     method : str
         A key of `pbrdf.wave.METHODS`.
     exponent : float, optional
@@ -106,7 +110,9 @@ class WaveModel:
         # A fault shows here, not at the first call. A density may be that of a profile,
         # which only the methods of profiles read
         method_of(method)
-        if psd is None:
+        if self.directional is not None:
+            self._check_directional(self.directional)
+        elif psd is None:
             _ = self.surface
         elif height_rms is not None:
             self._check_height()
@@ -122,13 +128,37 @@ class WaveModel:
                 raise fault from None
 
     @cached_property
+    def directional(self) -> Directional | None:
+        """Heights that differ from direction to direction, None of an isotropic surface."""
+        return directional_heights(
+            self.height_rms, self.corr_length, self.psd, self.autocorrelation
+        )
+
+    def _check_directional(self, heights: Directional) -> None:
+        """Refuse a form that needs more than the spectrum."""
+        if self.method not in heights.methods:
+            msg = (
+                f"method must be one of {', '.join(heights.methods)} where heights differ "
+                f"from direction to direction, got {self.method!r}: the others need slopes "
+                "and curvatures of an isotropic surface."
+            )
+            raise ValueError(msg)
+
+    def _isotropic(self, what: str) -> None:
+        """Refuse what is known of isotropic surfaces only."""
+        if self.directional is not None:
+            msg = f"{what} must be asked of an isotropic surface, got unequal directions."
+            raise ValueError(msg)
+
+    @cached_property
     def surface(self) -> Scattering:
         """The heights as those of an isotropic surface."""
-        return Scattering(self._heights(2), self.method, 2)
+        return Scattering(self.directional or self._heights(2), self.method, 2)
 
     @cached_property
     def profile(self) -> Scattering:
         """The heights as those of a profile."""
+        self._isotropic("a profile")
         heights = self.surface.heights if self.psd is None else self._heights(1)
         return Scattering(heights, self.method, 1)
 
@@ -145,6 +175,8 @@ class WaveModel:
         theta_s: npt.ArrayLike,
         dphi: npt.ArrayLike,
         wavelength: npt.ArrayLike,
+        *,
+        phi_i: npt.ArrayLike = 0.0,
     ) -> Array:
         """Mueller BRDF of the incoherent part, without the specular beam.
 
@@ -156,6 +188,8 @@ class WaveModel:
             phi_s - phi_i; specular at pi. [rad]
         wavelength : array_like
             Vacuum wavelength. [um]
+        phi_i : array_like
+            Azimuth of the source, where heights differ from direction to direction. [rad]
 
         Returns
         -------
@@ -167,8 +201,9 @@ class WaveModel:
         ValueError
             If an angle leaves its range (degrees?), or a wavelength the material's.
         """
-        shape, columns = self._columns(theta_i, theta_s, dphi, wavelength)
-        return self.surface.matrices(columns).reshape(*shape, 4, 4)
+        shape, columns, azimuth = self._columns(theta_i, theta_s, dphi, wavelength, phi_i)
+        found = self.surface.matrices(columns, phi_i=azimuth)
+        return found.reshape(*shape, 4, 4)
 
     def coherent(self, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike) -> Array:
         """Mueller matrix of the mean field: the specular beam, as wide as the incident one.
@@ -227,7 +262,7 @@ class WaveModel:
             "lie in [-1.571, 1.571] rad", "Angles are radians; use np.deg2rad.",
         )  # fmt: skip
         dphi = np.where(view >= 0, np.pi, 0.0)
-        shape, columns = self._columns(theta_i, np.abs(view), dphi, wavelength)
+        shape, columns, _ = self._columns(theta_i, np.abs(view), dphi, wavelength)
         four = self._in_plane(columns)
         return four[:, : 4 if interference else 2].reshape(*shape, -1)
 
@@ -247,7 +282,8 @@ class WaveModel:
         ndarray, shape (...)
             Error over value; 0.26 is 1 dB. [1]
         """
-        shape, columns = self._columns(theta_i, theta_s, dphi, wavelength)
+        self._isotropic("an error")
+        shape, columns, _ = self._columns(theta_i, theta_s, dphi, wavelength)
         heights = self.surface.heights
         found, best, orders, plane = (
             Scattering(heights, name, 2).matrices(columns)[:, 0] for name in self._compared
@@ -303,6 +339,7 @@ class WaveModel:
         wavelength : array_like
             Vacuum wavelength. [um]
         """
+        self._isotropic("the energy")
         theta, waves = checked_zenith("theta_i", theta_i), checked_wavelength(wavelength)
         theta, waves = np.broadcast_arrays(theta, waves)
         coherent = self.coherent(theta, waves)[..., 0, 0]
@@ -365,14 +402,16 @@ class WaveModel:
         theta_s: npt.ArrayLike,
         dphi: npt.ArrayLike,
         wavelength: npt.ArrayLike,
-    ) -> tuple[tuple[int, ...], list[Array]]:
-        """Broadcast shape; zeniths, dphi, wavelength, n, kappa as flat columns."""
+        phi_i: npt.ArrayLike = 0.0,
+    ) -> tuple[tuple[int, ...], list[Array], Array]:
+        """Broadcast shape; zeniths, dphi, wavelength, n, kappa as flat columns; phi_i."""
         waves = checked_wavelength(wavelength)
         n, kappa = self.material.indices(waves)
-        shape, columns = flat_geometry(theta_i, theta_s, dphi, 0.0, waves, n, kappa)
-        del columns[3]
+        shape, columns = flat_geometry(theta_i, theta_s, dphi, phi_i, waves, n, kappa)
         size = columns[0].size
-        return shape, [np.ascontiguousarray(np.broadcast_to(c, size)) for c in columns]
+        flat = [np.ascontiguousarray(np.broadcast_to(c, size)) for c in columns]
+        azimuth = flat.pop(3)
+        return shape, flat, azimuth
 
 
 def checked_wavelength(wavelength: npt.ArrayLike) -> Array:

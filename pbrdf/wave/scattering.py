@@ -13,6 +13,7 @@ from pbrdf.kernels.wave import orders
 from pbrdf.kernels.wave.orders import fill_moments
 from pbrdf.kernels.wave.scatter import Plan, fill_scattering
 from pbrdf.wave.coherent import MeanField, Medium, mean_field
+from pbrdf.wave.directional import Directional
 from pbrdf.wave.methods import method_of
 from pbrdf.wave.order_table import OrderTable
 from pbrdf.wave.statistics import Exponential, Gaussian, Statistics
@@ -54,7 +55,9 @@ class Scattering:
         self._table: OrderTable | None = None
         self._phases: dict[tuple[float, float, float], Array] = {}
 
-    def matrices(self, columns: list[Array], *, retarded: bool = True) -> Array:
+    def matrices(
+        self, columns: list[Array], *, retarded: bool = True, phi_i: Array | float = 0.0
+    ) -> Array:
         """Mueller matrices as rows of 16.
 
         Parameters
@@ -64,6 +67,8 @@ class Scattering:
         retarded : bool
             Whether s and p get the phase of the mean field, which takes most of the time
             and changes only elements of U and V.
+        phi_i : ndarray of N, or float
+            Azimuth of the source, where heights differ from direction to direction. [rad]
 
         Returns
         -------
@@ -80,12 +85,15 @@ class Scattering:
         moments = self._moments(2 * np.pi / columns[3].min())
         plan = Plan(self.method.kernel, self.dimensions, self.method.shadowed)
         height = self.heights.height_rms
+        lateral = self._lateral(columns, phi_i)
 
         def fill_part(start: int) -> None:
             part = slice(start, start + CHUNK)
             pieces = [c[part] for c in columns]
             k = 2 * np.pi / pieces[3]
             rise, wave = normal_and_lateral(pieces)
+            if lateral is not None:
+                wave = lateral[part] / k
             given = np.stack([k * height, spreads[part] / k, spreads[part] * height])
             fill_scattering(
                 np.stack(pieces[:3]), np.stack(pieces[4:]), given,
@@ -101,6 +109,19 @@ class Scattering:
                 list(pool.map(fill_part, starts))
         return out
 
+    def _lateral(self, columns: list[Array], phi_i: Array | float) -> Array | None:
+        """Return what stands for K [rad/um], where heights know its direction."""
+        if not isinstance(self.heights, Directional):
+            return None
+        theta_i, theta_s, dphi, wavelength = columns[:4]
+        # Light travels away from the source and towards the detector
+        out, into = np.sin(theta_s), np.sin(theta_i)
+        k, phi_s = 2 * np.pi / wavelength, phi_i + dphi
+        return self.heights.lateral(
+            k * (out * np.cos(phi_s) + into * np.cos(phi_i)),
+            k * (out * np.sin(phi_s) + into * np.sin(phi_i)),
+        )
+
     def mean_amplitudes(
         self, theta: Array, wavelength: Array, n: Array, kappa: Array
     ) -> Array:
@@ -111,7 +132,9 @@ class Scattering:
             return out
         for at in np.ndindex(columns[0].shape):
             angle, *given = (float(c[at]) for c in columns)
-            if self.method.mean_field == "kirchhoff":
+            if self.method.mean_field == "kirchhoff" or isinstance(
+                self.heights, Directional
+            ):
                 out[at] = self._kirchhoff(angle, *given)
             else:
                 out[at] = self._mean(angle, *given).amplitudes
