@@ -12,7 +12,7 @@ import xarray as xr
 
 from fitting.report import html
 from fitting.report.layers import fitted_layers, layers_of, light, with_readings
-from fitting.report.swept import points, swept
+from fitting.report.swept import points, what_was_swept
 from fitting.report.viewer import hemisphere_view
 from fitting.result.misfit import RULE
 from pbrdf import __version__
@@ -65,7 +65,7 @@ def sections_of(result: xr.Dataset, name: str) -> Iterator[str]:
         )
         if isinstance(result.attrs.get(key), Mapping)
     }  # fmt: skip
-    sentences = [_what(result), *swept(result), _how_sure(result)]
+    sentences = [_what(result), *what_was_swept(result), _how_sure(result)]
     if fits:
         sentences = [*fit_summary(fits), sentences[-1]]
     yield html.section("Summary", html.paragraph(" ".join(sentences)), facts(result, name))

@@ -7,12 +7,12 @@ import xarray as xr
 
 from pbrdf.derived.elements import mueller
 
-__all__ = ["points", "swept"]
+__all__ = ["points", "what_was_swept"]
 
 _OWN = {"bounces", "theta_i", "theta_s", "dphi", "stokes_out", "stokes_in", "run"}
 
 
-def swept(result: xr.Dataset) -> Iterator[str]:
+def what_was_swept(result: xr.Dataset) -> Iterator[str]:
     """Say what a sweep varied, and how much of it is there."""
     if "design" not in result.attrs:
         return
