@@ -8,10 +8,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pbrdf.contaminants.ground import Ground
+from pbrdf.contaminants.mesh_ground import MeshGround
 from pbrdf.contaminants.shapes import Shape
 from pbrdf.kernels.bodies.profile import widest_above
 from pbrdf.optics.materials import Material
 from pbrdf.surface.heightmap import HeightMap
+from pbrdf.surface.mesh import MeshSurface
 
 # How far below the lowest point of the surface a body still counts, relative to its height
 BELOW = 1e-6
@@ -123,7 +125,7 @@ class Contaminant(Protocol):
 
 def place(
     contaminants: Sequence[Contaminant],
-    surface: HeightMap,
+    surface: HeightMap | MeshSurface,
     seed: np.random.SeedSequence,
 ) -> Placement:
     """Lay contaminants on a surface.
@@ -132,7 +134,7 @@ def place(
     ----------
     contaminants : sequence
         Drops, spheres and films in the order of the scene.
-    surface : HeightMap
+    surface : HeightMap or MeshSurface
         The surface; bodies repeat with it if it is periodic.
     seed : SeedSequence
         Makes what is random reproducible; not changed.
@@ -143,7 +145,7 @@ def place(
         If a body is wider than a period or leaves a finite map, there is no room, or two
         contaminants are films.
     """
-    ground = Ground(surface)
+    ground = MeshGround(surface) if isinstance(surface, MeshSurface) else Ground(surface)
     materials: list[Material] = []
     settled: list[tuple[int, Settled]] = []
     film: PlacedFilm | None = None
@@ -222,7 +224,7 @@ def _not_filled_before(
     kept = np.ones(len(shapes), dtype=bool)
     if len(shapes) < 2:
         return kept
-    period = (*ground.surface.size, 0.0) if ground.surface.periodic else None
+    period = (*ground.size, 0.0) if ground.periodic else None
     heights = np.array([shape.height for shape in shapes])
     tree = cKDTree(
         np.where(place == period, 0.0, place) if period else place, boxsize=period
@@ -241,8 +243,8 @@ def _not_filled_before(
 
 def _check_extent(ground: Ground, x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> None:
     """Refuse bodies wider than a period, or across the rim of a finite map."""
-    lengths = ground.surface.size
-    if ground.surface.periodic:
+    lengths = ground.size
+    if ground.periodic:
         wide = np.flatnonzero(2 * radius > min(lengths))
         if wide.size:
             msg = (
@@ -252,17 +254,19 @@ def _check_extent(ground: Ground, x: np.ndarray, y: np.ndarray, radius: np.ndarr
             )
             raise ValueError(msg)
         return
+    left, front = ground.corner
     outside = (
-        (x - radius < 0.0)
-        | (x + radius > lengths[0])
-        | (y - radius < 0.0)
-        | (y + radius > lengths[1])
+        (x - radius < left)
+        | (x + radius > left + lengths[0])
+        | (y - radius < front)
+        | (y + radius > front + lengths[1])
     )
     if outside.any():
         k = int(np.flatnonzero(outside)[0])
         msg = (
-            f"bodies must lie inside the finite map of {lengths[0]:g} x {lengths[1]:g} um, "
+            f"bodies must lie inside the finite surface of {lengths[0]:g} x "
+            f"{lengths[1]:g} um, "
             f"got one of radius {radius[k]:.4g} um about ({x[k]:.4g}, {y[k]:.4g}) um. "
-            "Move it, or make the map periodic with HeightMap.mirrored()."
+            "Move it, or make the surface periodic: HeightMap.mirrored(), or period=."
         )
         raise ValueError(msg)

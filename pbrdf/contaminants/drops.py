@@ -247,6 +247,8 @@ class Drops:
             "notes": tuple(notes),
         }
         z = np.array([rest.z for rest in rests])
+        placed = zip(shapes, drops.x, drops.y, z, strict=True)
+        shapes = [ground.trimmed(*one) for one in placed]
         return Settled(shapes=shapes, x=drops.x, y=drops.y, z=z, report=report)
 
     def _spread(self, ground: Ground, notes: Sequence[str]) -> Settled:

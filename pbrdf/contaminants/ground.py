@@ -48,6 +48,21 @@ class Ground:
             )
             raise ValueError(msg)
 
+    @property
+    def size(self) -> tuple[float, float]:
+        """Lengths of the period, or of the whole finite map. [um]"""
+        return self.surface.size
+
+    @property
+    def corner(self) -> tuple[float, float]:
+        """Lowest x and y. [um]"""
+        return 0.0, 0.0
+
+    @property
+    def periodic(self) -> bool:
+        """Whether the surface repeats."""
+        return self.surface.periodic
+
     @cached_property
     def lowest(self) -> float:
         """Lowest node. [um]"""
@@ -66,7 +81,7 @@ class Ground:
     @property
     def area(self) -> float:
         """Area of one period, or of the whole finite map. [um²]"""
-        length_x, length_y = self.surface.size
+        length_x, length_y = self.size
         return length_x * length_y
 
     @cached_property
@@ -80,15 +95,15 @@ class Ground:
 
     def wrapped(self, places: np.ndarray) -> np.ndarray:
         """Move places (..., 2) into the period; on a finite map they stay. [um]"""
-        if not self.surface.periodic:
+        if not self.periodic:
             return places
-        return wrapped(places, np.asarray(self.surface.size))
+        return wrapped(places, np.asarray(self.size))
 
     def nearest(self, offsets: np.ndarray) -> np.ndarray:
         """Offsets (..., 2) to the nearest images; on a finite map they stay. [um]"""
-        if not self.surface.periodic:
+        if not self.periodic:
             return offsets
-        return nearest(offsets, np.asarray(self.surface.size))
+        return nearest(offsets, np.asarray(self.size))
 
     @property
     def _grid(self) -> tuple[np.ndarray, bool, float, float]:
@@ -144,6 +159,10 @@ class Ground:
             )  # fmt: skip
             start = found[0]
         return Rest(*map(float, found))
+
+    def trimmed(self, shape: Shape, x: float, y: float, z: float) -> Shape:
+        """Body of a drop; a height map hides all of it that lies below the surface."""
+        return shape
 
     def fill_level(self, thickness: float) -> tuple[float, float]:
         """Level [um] of liquid of a mean thickness in the valleys, and the share wet."""

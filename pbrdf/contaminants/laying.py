@@ -117,13 +117,13 @@ def grown(
     ValueError
         If the surface does not repeat.
     """
-    if not ground.surface.periodic:
+    if not ground.periodic:
         msg = (
             "surface must be periodic for a breath figure, got a finite map. Make it so "
             "with HeightMap.mirrored()."
         )
         raise ValueError(msg)
-    period = ground.surface.size
+    period = ground.size
     nuclei = population.counted(number_density, ground.area)
     axes, volumes = breath_figure(
         nuclei=rng.random((nuclei, 2)) * period,

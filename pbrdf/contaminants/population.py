@@ -52,20 +52,20 @@ def scatter(
     ValueError
         If a body finds no room.
     """
-    if 2 * radii.max() > min(ground.surface.size):
+    if 2 * radii.max() > min(ground.size):
         msg = (
-            f"bodies must be narrower than the surface of {min(ground.surface.size):g} um, "
+            f"bodies must be narrower than the surface of {min(ground.size):g} um, "
             f"got {2 * radii.max():.4g} um. Take a larger surface, or more and smaller "
             "bodies."
         )
         raise ValueError(msg)
     number = len(radii)
     places, extent = np.empty((number, 2)), np.empty(number)
-    span = np.asarray(ground.surface.size)
+    span = np.asarray(ground.size)
     order = np.argsort(-radii, kind="stable")
     for count, body in enumerate(order):
         taken = order[:count]
-        margin = 0.0 if ground.surface.periodic else radii[body]
+        margin = 0.0 if ground.periodic else radii[body]
         for _ in range(TRIES):
             x, y = margin + (span - 2 * margin) * rng.random(2)
             off = ground.nearest(places[taken] - (x, y))
@@ -75,7 +75,7 @@ def scatter(
             full = reach(int(body), float(x), float(y))
             if 2 * full > span.min() or (room < full).any():
                 continue
-            if not ground.surface.periodic and (
+            if not ground.periodic and (
                 min(x, y) < full or x + full > span[0] or y + full > span[1]
             ):
                 continue
@@ -95,7 +95,7 @@ def scatter(
 
 def overlapping(ground: Ground, axes: np.ndarray, reach: np.ndarray) -> np.ndarray:
     """Pairs of circles that overlap on the surface, shape (pairs, 2), the deepest first."""
-    box = ground.surface.size if ground.surface.periodic else None
+    box = ground.size if ground.periodic else None
     points = ground.wrapped(axes)
     tree = cKDTree(points, boxsize=box)
     pairs = tree.query_pairs(2 * float(reach.max()), output_type="ndarray")

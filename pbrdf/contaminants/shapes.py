@@ -64,6 +64,16 @@ class Shape:
         """Volume above the plane. [um³]"""
         return float(2 * np.pi * moment_between(self.slabs, 0.0, self.height))
 
+    def above(self, level: float) -> "Shape":
+        """Return the part above a height, in two slabs or more. [um]"""
+        kept = np.array(self.slabs[self.slabs[:, 1] > level])
+        kept[0, 0] = max(kept[0, 0], level)
+        if len(kept) == 1 and kept[0, 0] > self.bottom:
+            # One slab alone is taken for a closed quadric
+            kept = np.repeat(kept, 2, axis=0)
+            kept[0, 1] = kept[1, 0] = 0.5 * (kept[0, 0] + kept[1, 1])
+        return Shape(kept)
+
 
 def sphere(radius: float, centre: float) -> Shape:
     """Sphere whose centre lies at a height above the plane, or below. [um]"""

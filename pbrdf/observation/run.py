@@ -239,6 +239,12 @@ def _angles(
             "Give them a period, or use simulate."
         )
         raise ValueError(msg)
+    if isinstance(surface, MeshSurface) and surface.transparent:
+        msg = (
+            f"transparent must be empty to observe, got labels {surface.transparent}. Use "
+            "simulate with source_half_angle and bins as wide as the detector."
+        )
+        raise ValueError(msg)
     if len(scene.contaminants) > 0:
         msg = (
             f"contaminants must be empty to observe, got {len(scene.contaminants)}. "

@@ -25,7 +25,9 @@ from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, MeshSurfa
 SURFACE_KEYS = {
     "gaussian": {"shape", "spacing_um", "corr_length_um", "slope_rms", "height_rms_um"},
     "height_map": {"file", "heights_um", "spacing_um", "periodic", "labels"},
-    "mesh": {"file", "vertices_um", "faces", "period_um", "labels", "unit"},
+    "mesh": {
+        "file", "vertices_um", "faces", "period_um", "labels", "unit", "transparent",
+    },
     "flat": {"size_um"},
     "measured": {
         "shape", "spacing_um", "corr_length_um", "height_rms_um",
@@ -33,7 +35,7 @@ SURFACE_KEYS = {
     },
 }  # fmt: skip
 # Words and switches; all else is numbers
-_WORDS = {"file", "periodic", "unit"}
+_WORDS = {"file", "periodic", "transparent", "unit"}
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -140,13 +142,14 @@ def _read_mesh(table: dict[str, Any], source: Path) -> MeshSurface:
     _check_type(table, "file", str, "Name a mesh file.", source)
     _check_type(table, "unit", str, 'Name a unit, such as "um".', source)
     labels = table.get("labels")
+    options = {key: table[key] for key in ("unit", "transparent") if key in table}
     period = _pair(table["period_um"]) if "period_um" in table else None
     if "file" in table:
         file = companion(source, table["file"], "[surface]")
-        return MeshSurface(file, period, labels, unit=table.get("unit"))
+        return MeshSurface(file, period, labels, **options)
     check_present(table, ("faces",), "surface", source)
     arrays = np.asarray(table["vertices_um"]), np.asarray(table["faces"])
-    return MeshSurface(arrays, period, labels, unit=table.get("unit"))
+    return MeshSurface(arrays, period, labels, **options)
 
 
 def _read_substrate(table: dict[str, Any], source: Path) -> Material | list[Material]:

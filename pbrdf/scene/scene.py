@@ -9,6 +9,7 @@ from pbrdf.contaminants import Drops, Film, Spheres
 from pbrdf.notebook import table
 from pbrdf.optics import library
 from pbrdf.optics.materials import Material
+from pbrdf.scene.refusals import check_clear, check_on_mesh
 from pbrdf.scene.write import write_scene
 from pbrdf.surface import FixedSurface, MeshSurface, Surface
 
@@ -25,7 +26,8 @@ class Scene:
         A fixed surface, or an ensemble of which realisations are drawn.
     substrate : Material or str, or a sequence of them
         Material under the surface, or its name in the library; several where the labels of
-        a HeightMap or MeshSurface number them.
+        a HeightMap or MeshSurface number them. Light goes through those that the mesh has
+        as `transparent`; where solids overlap, the one with the lowest label rules.
     contaminants : Drops, Spheres or Film, or a sequence of them
         What lies on the surface; where two overlap, the first rules. One Film at most.
 
@@ -68,13 +70,9 @@ class Scene:
         object.__setattr__(self, "surface", surface)
         object.__setattr__(self, "substrate", materials if several else materials[0])
         lying = _checked(contaminants)
-        if lying and isinstance(surface, MeshSurface):
-            msg = (
-                f"contaminants must be left out on a MeshSurface, got {len(lying)}, the "
-                f"first of them {type(lying[0]).__name__}. Make opaque bodies a part of "
-                "the mesh, with labels= for their material, or lay them on a HeightMap."
-            )
-            raise ValueError(msg)
+        if isinstance(surface, MeshSurface):
+            check_clear(surface, materials)
+            check_on_mesh(surface, lying)
         object.__setattr__(self, "contaminants", lying)
 
     @property

@@ -50,14 +50,12 @@ def scene_solids(
     surface = scene.surface
     if not isinstance(surface, FixedSurface):
         surface = surface.sample(heights)
-    if isinstance(surface, MeshSurface):
-        if base is not None:
-            msg = f"base must be left out for a mesh, got {base}. It is what it is."
-            raise ValueError(msg)
-        return {"surface": made(np.array(surface.vertices), np.array(surface.faces))}
-    sheet = MeshSurface.of_map(surface)
+    if isinstance(surface, MeshSurface) and base is not None:
+        msg = f"base must be left out for a mesh, got {base}. It is what it is."
+        raise ValueError(msg)
+    sheet = surface if isinstance(surface, MeshSurface) else MeshSurface.of_map(surface)
     solids = {"surface": made(np.array(sheet.vertices), np.array(sheet.faces))}
-    if base is not None:
+    if base is not None and isinstance(surface, HeightMap):
         thick = float(require("base", base, lambda v: v > 0, "be positive [um]", "Um."))
         solids["surface"] = made(*_block(sheet, surface, thick))
     if not scene.contaminants:

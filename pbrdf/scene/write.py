@@ -118,6 +118,8 @@ def _mesh_table(surface: MeshSurface, target: Path | None) -> dict[str, Any]:
     table: dict[str, Any] = {"type": "mesh"}
     if surface.period is not None:
         table["period_um"] = list(surface.period)
+    if surface.transparent:
+        table["transparent"] = list(surface.transparent)
     labels = surface.labels
     if len(surface.vertices) <= INLINE_VERTICES:
         table |= {

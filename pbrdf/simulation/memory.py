@@ -118,7 +118,7 @@ def at_work(
     batched = not arguments.varies(scene) or drawn == 1
     samples = max(arguments.BATCHES, drawn) if batched else drawn
     samples = _MANY if planned else samples
-    clean = not scene.contaminants
+    clean = not scene.contaminants and not getattr(scene.surface, "transparent", ())
     spectral = clean and size.waves >= WORTHWHILE
     # Those traced, those that wait for the one before them, and the one that is added
     tallies = min(samples, 2 * threads + 1)

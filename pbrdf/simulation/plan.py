@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.conventions import BOUNCES
-from pbrdf.kernels.bodies.events import Media
+from pbrdf.kernels.bodies.world import Media
 from pbrdf.kernels.paths import shading
 from pbrdf.kernels.paths.spectra import N_SUMS, Spectra
 from pbrdf.simulation.spectra import WORTHWHILE, Spectrum
@@ -37,7 +37,7 @@ class Plan:
     skips : frozenset of str
         Names of the skips of `pbrdf.simulation.skips` that are allowed.
     media : Media or None
-        Constants of what lies on the surface; None on a clean one.
+        Constants of what light goes through; None on a clean opaque surface.
     half_angle : float
         Half-angle of the source. [rad]
     fold : bool

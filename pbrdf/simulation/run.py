@@ -15,7 +15,7 @@ import pbrdf.accessor  # noqa: F401  (registers ds.pbrdf)
 from pbrdf.contaminants import Film
 from pbrdf.contaminants.arguments import material_of
 from pbrdf.errors import AccuracyWarning
-from pbrdf.kernels.bodies.events import Media
+from pbrdf.kernels.bodies.world import Media
 from pbrdf.kernels.paths.shading import LEAKED, N_LEAKED, N_SIDE, SIDEWAYS, TRUNCATED
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.memory import OF_SIZE, asked_size, check_run
@@ -31,8 +31,13 @@ from pbrdf.surface import HeightMap, MeshSurface
 from pbrdf.tracer import arguments
 from pbrdf.tracer.asked import Run
 from pbrdf.tracer.field import Field
+from pbrdf.tracer.media import (
+    clear_materials,
+    covering_materials,
+    media_of,
+    opaque_drop_notes,
+)
 from pbrdf.tracer.thin_films import thin_absorber_warnings
-from pbrdf.tracer.wet_field import contaminant_materials, media_of, opaque_drop_notes
 from pbrdf.validity import (
     Judgement,
     attach,
@@ -95,7 +100,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
         Makes the run reproducible bit for bit, for any number of workers; None draws one.
     max_bounces : int, optional
         Paths are cut after so many bounces, 64 on a clean surface and 1024 among
-        contaminants, where light may be caught; what they still carry is `truncated`.
+        contaminants and in solids of a mesh, where light may be caught; what they still
+        carry is `truncated`.
     target_rel_error : float, optional
         Add samples until the largest stderr / M00 over the bins above a tenth of the peak
         falls below this; the dataset says what was reached. Without n_rays and realizations
@@ -302,7 +308,8 @@ def _plans(  # noqa: PLR0913  (arguments of `simulate`)
     if max_bounces is None:
         max_bounces = MOST_BOUNCES if media is None else MOST_EVENTS
     allowed = chosen_skips(skips)
-    if media is not None and "walk" not in allowed:
+    walks = not isinstance(run.scene.surface, MeshSurface)
+    if walks and media is not None and "walk" not in allowed:
         msg = (
             f'skips must hold "walk" among contaminants, got {sorted(allowed)}. '
             "The Embree route traces clean surfaces only."
@@ -328,13 +335,13 @@ def _plans(  # noqa: PLR0913  (arguments of `simulate`)
 
 
 def _media(run: Run) -> Media | None:
-    """Tell what light goes through, None on a clean surface."""
+    """Tell what light goes through, None on a clean opaque surface."""
     scene = run.scene
-    if not scene.contaminants:
+    covering = covering_materials(scene)
+    if not covering:
         return None
-    covering = contaminant_materials(scene.contaminants)
     films = [one.material for one in scene.contaminants if isinstance(one, Film)]
-    return media_of(scene.materials, covering, run.waves, films)
+    return media_of(scene.materials, covering, run.waves, [*films, *clear_materials(scene)])
 
 
 def _counts(

@@ -12,13 +12,14 @@ from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.plan import Plan, Tally
 from pbrdf.simulation.single_bounce import SingleBounce
 from pbrdf.simulation.trace import Target, prepare, trace_sample
-from pbrdf.surface import FixedSurface, HeightMap
+from pbrdf.surface import FixedSurface, HeightMap, MeshSurface
 from pbrdf.tracer import arguments
 from pbrdf.tracer.asked import Run
 from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.schedule import gather
 from pbrdf.tracer.wet_field import WetField
+from pbrdf.tracer.wet_mesh import WetMesh
 
 
 def trace_samples(
@@ -54,10 +55,12 @@ def _realize(scene: Scene, plan: Plan, seed: np.random.SeedSequence) -> Target:
     surface = scene.surface
     if not isinstance(surface, FixedSurface):
         surface = surface.sample(seed)
+    if isinstance(surface, MeshSurface) and plan.media is not None:
+        return WetMesh.of(surface, scene, plan.media, seed, plan.skips)
     target = prepare(surface, plan.skips)
     if plan.media is None:
         return target
-    # Contaminants exclude meshes and the Embree route
+    # Contaminants on a height map exclude the Embree route
     assert isinstance(target, Field)
     assert isinstance(surface, HeightMap)
     return WetField.of(

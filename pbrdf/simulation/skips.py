@@ -69,6 +69,8 @@ def mesh_explanation(plan: Plan, *, faces: int, kind: str) -> list[str]:
         f"Embree: one tree over {faces} faces finds facets for all angles; float64 says "
         f"where they are met; {below}."
     ]
+    if plan.media is not None:
+        lines += _about_beams(plan)
     return lines + _about_the_plan(plan)
 
 
@@ -99,8 +101,6 @@ def _about_contaminants(plan: Plan, periodic: bool, steepest: float) -> list[str
     assert plan.media is not None
     lines = [
         "Embree: not built; bodies are met exactly, by a grid, and the ground by a walk.",
-        "Parts of a split ray below a hundredth of it: one of the two is followed, by "
-        "chance; below a thousandth, by chance or not at all.",
     ]
     if "sweep" in plan.skips and periodic:
         lines.append(
@@ -116,6 +116,16 @@ def _about_contaminants(plan: Plan, periodic: bool, steepest: float) -> list[str
             "The ground, for rays rising above all that lies ahead of it in their octant, "
             f"by blocks of {BLOCK} cells: not searched."
         )
+    return lines + _about_beams(plan)
+
+
+def _about_beams(plan: Plan) -> list[str]:
+    """Say what is left out of the parts into which light comes apart."""
+    assert plan.media is not None
+    lines = [
+        "Parts of a split ray below a hundredth of it: one of the two is followed, by "
+        "chance; below a thousandth, by chance or not at all.",
+    ]
     if not plan.media.absorption.any():
         lines.append("Absorption on the way: none in any medium, not computed.")
     elif "deep" in plan.skips:

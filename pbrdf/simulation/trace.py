@@ -6,8 +6,8 @@ import numpy as np
 
 from pbrdf.kernels.bins.binning import bin_edges
 from pbrdf.kernels.bodies.beams import N_STATE, Room
-from pbrdf.kernels.bodies.events import N_HIT
-from pbrdf.kernels.bodies.transparent import trace_among_bodies
+from pbrdf.kernels.bodies.transparent import trace_among_bodies, trace_on_mesh
+from pbrdf.kernels.bodies.world import N_HIT
 from pbrdf.kernels.paths import shading
 from pbrdf.kernels.paths.first_bounce import N_MIRRORED, LineRoom
 from pbrdf.kernels.paths.spectra import close_sums
@@ -28,9 +28,13 @@ from pbrdf.tracer.embree import EmbreeField
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.mesh_field import MeshField
 from pbrdf.tracer.wet_field import WetField
+from pbrdf.tracer.wet_mesh import WetMesh
 
-# What is traced: a height map, one by way of Embree, one with what lies on it, or a mesh
-Target = Field | EmbreeField | WetField | MeshField
+# What is traced: a height map, one by way of Embree, one with what lies on it, a mesh, or
+# one with solids that light goes through or with what lies on it
+Target = Field | EmbreeField | WetField | MeshField | WetMesh
+
+NO_MEETINGS = np.empty((0, N_FIRST))
 
 
 def prepare(
@@ -62,19 +66,12 @@ def trace_sample(
     neither the number of threads nor the intersector changes the rays.
     """
     tally = Tally.empty(plan) if room is None else room
-    if isinstance(target, WetField):
+    if isinstance(target, WetField | WetMesh):
         tally = replace(tally, reports=target.reports, notes=target.notes)
     zenith, azimuth = bin_edges(plan.n_theta, plan.n_dphi)
     record = np.empty((plan.max_bounces + 1, 1, shading.N_RECORD))
     waiting = np.empty((plan.max_bounces, N_WAITING))
-    rng = np.random.default_rng(seed)
-    number, own = plan.n_streams, plan.own
-    shifts = rng.random((number, 3))
-    streams = rng.integers(2**63, size=number, dtype=np.uint64)[own]
-    if plan.half_angle > 0.0:
-        # Drawn last, so that a narrow beam keeps its rays
-        shifts = np.hstack([shifts, rng.random((number, 2))])
-    shifts = shifts[own]
+    shifts, streams = _drawn(plan, seed)
     for index, theta in enumerate(plan.theta_i):
         field = target if isinstance(target, Field | MeshField) else target.field
         launch = field.entry_rectangle(theta, plan.phi_i, plan.half_angle)
@@ -88,6 +85,12 @@ def trace_sample(
             tally.counts[index], np.zeros((4, 4)),
         )  # fmt: skip
         light = tally.spectra[index] if tally.spectra else NOTHING
+        if isinstance(target, WetMesh):
+            trace_on_mesh(
+                target.world(), source, target.field.top, plan.max_bounces, plan.n_stokes,
+                _room(plan, NO_MEETINGS), bins,
+            )  # fmt: skip
+            continue
         if isinstance(field, MeshField):
             trace_mesh_batch(
                 field.facets(), source, record, waiting, light, plan.optics, bins
@@ -104,12 +107,9 @@ def trace_sample(
             np.empty(longest * N_MIRRORED),
         )  # fmt: skip
         if isinstance(target, WetField):
-            places = Room(
-                np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT), line.meetings
-            )
             trace_among_bodies(
                 target.world, source, field.terrain.z_top, plan.max_bounces,
-                plan.n_stokes, places, bins,
+                plan.n_stokes, _room(plan, line.meetings), bins,
             )  # fmt: skip
             continue
         sink = (record, waiting, light, plan.optics, bins)
@@ -121,3 +121,20 @@ def trace_sample(
         if tally.spectra:
             close_sums(light, plan.n_stokes, bins.lit)
     return tally
+
+
+def _drawn(plan: Plan, seed: np.random.SeedSequence) -> tuple[np.ndarray, np.ndarray]:
+    """Shifts of the entry points and stream of random numbers of each direction."""
+    rng = np.random.default_rng(seed)
+    number, own = plan.n_streams, plan.own
+    shifts = rng.random((number, 3))
+    streams = rng.integers(2**63, size=number, dtype=np.uint64)[own]
+    if plan.half_angle > 0.0:
+        # Drawn last, so that a narrow beam keeps its rays
+        shifts = np.hstack([shifts, rng.random((number, 2))])
+    return shifts[own], streams
+
+
+def _room(plan: Plan, meetings: np.ndarray) -> Room:
+    """Room for the parts of one ray; `meetings` are the first facets of a line."""
+    return Room(np.empty((plan.max_bounces + 2, N_STATE)), np.zeros(N_HIT), meetings)

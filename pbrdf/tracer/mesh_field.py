@@ -12,7 +12,13 @@ import numpy as np
 
 from pbrdf.kernels import compiled_callback
 from pbrdf.kernels.meshes import facets as kernel
-from pbrdf.kernels.meshes.search import AT_ADDRESSES, AT_QUERY, N_QUERY, judge
+from pbrdf.kernels.meshes.search import (
+    AT_ADDRESSES,
+    AT_QUERY,
+    N_ADDRESSES,
+    N_QUERY,
+    judge,
+)
 from pbrdf.kernels.terrain.embree import N_WORDS
 from pbrdf.surface.mesh.surface import MeshSurface
 from pbrdf.tracer.embree import (
@@ -42,10 +48,14 @@ RIM = 1e-3
 KINDS = {"ground": kernel.GROUND, "bodies": kernel.BODIES, "sheet": kernel.SHEET}
 # A cache alone lets two threads compile one each
 _JUDGE_LOCK = threading.Lock()
-NO_LABELS = np.empty(0, dtype=np.uint8)
+NO_LABELS, NO_SOLIDS = np.empty(0, dtype=np.uint8), np.empty(0, dtype=np.int32)
+for _none in (NO_LABELS, NO_SOLIDS):
+    # Of the same kind as others, or the kernels would be compiled once more
+    _none.setflags(write=False)
+OPAQUE = np.zeros(1, dtype=np.int64)
 # Bytes of a ray, then of RTCIntersectArguments and of the context with the query behind
 RAY_BYTES, ARGUMENTS_BYTES = 4 * N_WORDS, 64
-CONTEXT_BYTES = AT_ADDRESSES + 4 * 8
+CONTEXT_BYTES = AT_ADDRESSES + 8 * N_ADDRESSES
 # Numbers of RTCIntersectArguments: call back for every facet; all features
 INVOKE_FILTER, ALL_FEATURES, NO_INSTANCE = 1 << 1, 0xFFFFFFFF, 0xFFFFFFFF
 
@@ -64,7 +74,7 @@ def judge_address() -> int:
 def free_slope(surface: MeshSurface) -> float:
     """Slope from which on a rising ray is free: infinite where the mesh hangs over."""
     level = surface.normals[:, 2]
-    if surface.kind == "bodies" or level.min() <= 0.0:
+    if surface.kind == "bodies" or surface.transparent or level.min() <= 0.0:
         return np.inf
     # A hair more than the steepest facet, for the rounding of its normal
     return float(np.sqrt(1.0 / level.min() ** 2 - 1.0) * (1.0 + 1e-9))
@@ -84,16 +94,28 @@ class MeshField:
         Shift of each image. [um]
     scene : int
         Embree's scene of the images.
+    top : float
+        Height of the entry points: that of the highest vertex, or of what lies on it. [um]
     """
 
     surface: MeshSurface
     frame: kernel.MeshFrame
     images: np.ndarray
     scene: int
+    top: float
 
     @classmethod
-    def of(cls, surface: MeshSurface, skips: frozenset[str] = frozenset()) -> "MeshField":
-        """Build the tree over a mesh, for tracing with the skips allowed."""
+    def of(
+        cls,
+        surface: MeshSurface,
+        skips: frozenset[str] = frozenset(),
+        *,
+        top: float = -np.inf,
+    ) -> "MeshField":
+        """Build the tree over a mesh, for tracing with the skips allowed.
+
+        `top` is the highest point of what lies on it. [um]
+        """
         low, high = surface.bounds
         center = 0.5 * (low + high)
         half = 0.5 * (high - low)
@@ -147,7 +169,10 @@ class MeshField:
         if surface.period is not None:
             tree, scene = scene, build_images(scene, images / unit, flags)
             library().rtcReleaseScene(tree)
-        made = cls(surface=surface, frame=frame, images=images, scene=scene)
+        made = cls(
+            surface=surface, frame=frame, images=images, scene=scene,
+            top=max(frame.z_high, float(top)),
+        )  # fmt: skip
         weakref.finalize(made, library().rtcReleaseScene, made.scene)
         return made
 
@@ -177,7 +202,7 @@ class MeshField:
         low, high = self.surface.bounds
         if self.surface.period is not None:
             return np.array([*low[:2], *self.surface.period])
-        height = self.frame.z_high - self.frame.z_bottom
+        height = self.top - self.frame.z_bottom
         if phi_i is None:
             reach = np.tan(theta_i + half_angle) * height
             drift = np.array([[-reach, reach], [-reach, reach]])
@@ -200,8 +225,11 @@ class MeshField:
             raise ValueError(msg)
         return np.concatenate([low[:2] + corner, lengths])
 
-    def facets(self) -> kernel.Facets:
-        """Give the mesh with room for one ray: each thread takes one of its own."""
+    def facets(self, behind: np.ndarray = OPAQUE) -> kernel.Facets:
+        """Give the mesh with room for one ray: each thread takes one of its own.
+
+        `behind` is the medium of each transparent solid, and before them 0 of none.
+        """
         memory = np.zeros(RAY_BYTES + ARGUMENTS_BYTES + CONTEXT_BYTES + ALIGNMENT, np.uint8)
         memory = memory[-memory.ctypes.data % ALIGNMENT :]
         ray = memory[:RAY_BYTES].view(np.float32)
@@ -209,21 +237,25 @@ class MeshField:
         context = memory[RAY_BYTES + ARGUMENTS_BYTES :][:CONTEXT_BYTES]
         surface = self.surface
         normals = surface.normals
+        within = np.zeros(len(behind) + 1, dtype=np.int64)
         arguments[:8].view(np.uint32)[:] = INVOKE_FILTER, ALL_FEATURES
         arguments[8:24].view(np.int64)[:] = context.ctypes.data, judge_address()
         context[:8].view(np.uint32)[:] = NO_INSTANCE
+        labels = NO_LABELS if surface.labels is None else surface.labels
+        solids = NO_SOLIDS if surface.solids is None else surface.solids
         context[AT_ADDRESSES:].view(np.int64)[:] = [
-            array.ctypes.data
-            for array in (surface.vertices, surface.faces, normals, self.images)
-        ]
+            array.ctypes.data if array.size else 0
+            for array in (
+                surface.vertices, surface.faces, normals, self.images, solids, within,
+            )
+        ]  # fmt: skip
         first, any_one = (
             ctypes.cast(one, ctypes.c_void_p).value
             for one in (library().rtcIntersect1, library().rtcOccluded1)
         )
         return kernel.Facets(
-            surface.vertices, surface.faces, normals,
-            NO_LABELS if surface.labels is None else surface.labels, self.frame,
-            first, any_one, self.scene, ray.ctypes.data, arguments.ctypes.data, ray,
+            surface.vertices, surface.faces, normals, labels, solids, self.frame, behind,
+            within, first, any_one, self.scene, ray.ctypes.data, arguments.ctypes.data, ray,
             ray.view(np.uint32), self.images,
             context[AT_QUERY : AT_QUERY + 8 * N_QUERY].view(np.float64),
             np.zeros(1, dtype=np.int64),

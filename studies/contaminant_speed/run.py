@@ -14,8 +14,9 @@ from pbrdf.contaminants.bodies import place
 from pbrdf.kernels import jit
 from pbrdf.kernels.bins.binning import bin_edges
 from pbrdf.kernels.bodies.beams import KX, KY, KZ, N_STATE, Room, X, Y, Z
-from pbrdf.kernels.bodies.events import N_HIT, next_event
+from pbrdf.kernels.bodies.events import next_event
 from pbrdf.kernels.bodies.transparent import follow_beam, launch_beam
+from pbrdf.kernels.bodies.world import N_HIT
 from pbrdf.kernels.paths import shading
 from pbrdf.kernels.paths.random import Draw
 from pbrdf.kernels.terrain.entry import Source, entry_point, rays_of_line
@@ -23,8 +24,9 @@ from pbrdf.kernels.terrain.sweep import N_FIRST
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.skips import SKIPS
 from pbrdf.simulation.trace import prepare, trace_sample
+from pbrdf.tracer.media import media_of
 from pbrdf.tracer.mesh import build_mesh
-from pbrdf.tracer.wet_field import WetField, media_of
+from pbrdf.tracer.wet_field import WetField
 
 WATER, PAINT = pbrdf.Material(1.333), pbrdf.Material(1.5)
 SURFACE = pbrdf.GaussianSurface(

@@ -20,7 +20,8 @@ from pbrdf.contaminants.bodies import Bodies as Placed
 from pbrdf.contaminants.bodies import Placement
 from pbrdf.kernels.bodies.bodies import Bodies, body_interval
 from pbrdf.tracer.field import Field
-from pbrdf.tracer.wet_field import media_of, world_of
+from pbrdf.tracer.media import media_of
+from pbrdf.tracer.wet_field import world_of
 from tests.contaminants.scenes import assert_closed, clean_counters
 
 WATER, OIL, GLASS = Material(1.333), Material(1.47), Material(1.6)

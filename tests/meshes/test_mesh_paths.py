@@ -6,7 +6,8 @@ import trimesh
 from numpy.testing import assert_allclose
 
 from pbrdf import GaussianSurface, Material, MeshSurface, Scene, simulate
-from pbrdf.kernels.meshes.seek import BELOW, WRONG, seek_facet
+from pbrdf.kernels.meshes.seek import seek_facet
+from pbrdf.kernels.meshes.shots import BELOW, WRONG
 from pbrdf.kernels.terrain.heightfield import ESCAPED, HIT, LOST
 from pbrdf.tracer.mesh_field import MeshField
 from tests.meshes.shapes import (

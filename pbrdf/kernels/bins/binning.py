@@ -85,9 +85,11 @@ def exact_bin(theta, dphi, x, y, z, cos_phi_i, sin_phi_i, zenith, azimuth):
     while across * azimuth[i_dphi, 0] < along * azimuth[i_dphi, 1]:
         i_dphi = i_dphi - 1 if i_dphi > 0 else n_dphi - 1
     upper = i_dphi + 1 if i_dphi + 1 < n_dphi else 0
-    while across * azimuth[upper, 0] >= along * azimuth[upper, 1] and (
-        along != 0.0 or across != 0.0
-    ):
+    for _ in range(n_dphi):
+        # With two bins what lies along their edge is past both of them
+        past = across * azimuth[upper, 0] >= along * azimuth[upper, 1]
+        if not past or (along == 0.0 and across == 0.0):
+            break
         i_dphi = upper
         upper = i_dphi + 1 if i_dphi + 1 < n_dphi else 0
     return i_theta, i_dphi

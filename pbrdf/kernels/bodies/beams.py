@@ -22,13 +22,26 @@ N_STATE = MUELLER + 16
 
 FREE, ON_GROUND, ON_FILM, ON_BODY = 0, 1, 2, 3
 NOTHING = -1.0
-FILM = -5.0  # the number of the film among the bodies a beam is inside of
+# Numbers among the bodies a beam is inside of: the film, and solids of a mesh from -17 down
+FILM, FIRST_SOLID = -5.0, -16.0
 
 # Room to work in: the stack (events + 2, N_STATE), what the next event is, and the first
 # facets of the rays of a line as `sweep_line` finds them, of no size where every ray is
 # followed from its start. Every event leaves at most one part behind, so a stack of two
 # rows more than events is never full.
 Room = namedtuple("Room", "state hit meetings")
+
+
+@jit(forceinline=True)
+def number_of_solid(solid):
+    """Give the number of a solid of a mesh among what a beam is inside of."""
+    return FIRST_SOLID - solid
+
+
+@jit(forceinline=True)
+def solid_of_number(number):
+    """Give the solid of a mesh that has this number."""
+    return int(FIRST_SOLID - number)
 
 
 @jit(forceinline=True)

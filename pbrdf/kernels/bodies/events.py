@@ -1,12 +1,11 @@
 """What a beam among bodies meets next, and where: geometry only.
 
 The ground and the upper side of a film are walked over, bodies are met at the roots of
-quadratics. What the beam is inside of is a list that changes when it crosses a surface;
-no point is ever tested.
+quadratics, and facets of a mesh as `pbrdf.kernels.bodies.on_mesh` says. What the beam is
+inside of is a list that changes when it crosses a surface; no point is ever tested.
 """
 
 import math
-from collections import namedtuple
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.bodies.beams import (
@@ -49,6 +48,29 @@ from pbrdf.kernels.bodies.bodies import (
     next_body,
 )
 from pbrdf.kernels.bodies.interfaces import way_of_beam
+from pbrdf.kernels.bodies.on_mesh import next_on_mesh
+from pbrdf.kernels.bodies.world import (
+    ASIDE,
+    ASTRAY,
+    BODY_IN,
+    BODY_OUT,
+    CONFORMAL,
+    FILM_DOWN,
+    FILM_UP,
+    GROUND,
+    HIT_BODY,
+    HIT_FACET,
+    HIT_I,
+    HIT_J,
+    HIT_U,
+    HIT_V,
+    HIT_Z,
+    LEVEL,
+    OUT,
+    SOLID_IN,
+    SOLID_OUT,
+)
+from pbrdf.kernels.meshes.facets import facet_normal
 from pbrdf.kernels.optics.light import GRAZING
 from pbrdf.kernels.optics.vectors import Vec, dot, opposite
 from pbrdf.kernels.paths.ray_bounce import normal_of_slopes
@@ -65,23 +87,6 @@ from pbrdf.kernels.terrain.horizon import is_free
 from pbrdf.kernels.terrain.sweep import F_FACET, F_I, F_J, F_U, F_V, F_Z
 
 MAX_STEPS = 10_000_000
-NO_FILM, CONFORMAL, LEVEL = 0, 1, 2
-# What comes next: a facet of the ground or of the film, from above or from below; the
-# surface of a body, from outside or inside; or the end of the path
-GROUND, FILM_DOWN, FILM_UP, BODY_IN, BODY_OUT, OUT, ASIDE, ASTRAY = 0, 1, 2, 3, 4, 5, 6, 7
-# What the next event is, after the columns of `pbrdf.kernels.bodies.bodies`
-HIT_BODY, HIT_I, HIT_J, HIT_FACET, HIT_U, HIT_V, HIT_Z, N_HIT = 3, 4, 5, 6, 7, 8, 9, 10
-
-# A film: its kind, its thickness or level [um], its medium, and the ground upside down
-Film = namedtuple("Film", "kind height medium flipped")
-# Media that light goes through, 0 the air: index and absorption [1/um] (wavelengths,
-# media), and the solid that a medium is instead, or -1. Solids, first the materials of the
-# ground: index (wavelengths, solids), which are black, and the diffuse base under each
-# medium (wavelengths, solids, media): its strength, and the share of samples of what a
-# medium takes in only because it absorbs
-Media = namedtuple("Media", "n kappa absorption solid solid_n solid_kappa black base tail")
-# `deep` is the optical depth from which on light is not followed, or inf
-World = namedtuple("World", "terrain film bodies media deep")
 
 
 @jit(forceinline=True)
@@ -147,8 +152,9 @@ def next_surface(world, state, top, t_limit, hit):
     # The way out of every body that holds the beam
     for slot in range(int(state[top, N_INSIDE])):
         number = state[top, INSIDE + 3 * slot]
-        if number == FILM:
-            in_film = True
+        if number < 0.0:
+            # The way out of the film or of a solid is found with its facets
+            in_film = in_film or number == FILM
             continue
         bodies_inside += 1
         axis_x = state[top, INSIDE + 3 * slot + 1]
@@ -186,10 +192,27 @@ def next_surface(world, state, top, t_limit, hit):
 @jit(forceinline=True)
 def next_event(world, state, top, hit):
     """Find what the beam meets next; where and how far away is written into `hit`."""
-    terrain, film = world.terrain, world.film
     kind, in_film = next_surface(world, state, top, FAR, hit)
     if kind == ASTRAY:
         return ASTRAY
+    return next_of_facets(world, world.terrain, world.mesh, state, top, kind, in_film, hit)
+
+
+@jit(forceinline=True)
+def next_of_facets(world, terrain, mesh, state, top, kind, in_film, hit):
+    """Find whether the beam meets a facet before the event of this kind in `hit`."""
+    event = kind
+    if terrain is not None:
+        event = next_on_terrain(world, terrain, state, top, kind, in_film, hit)
+    if mesh is not None:
+        event = next_on_mesh(mesh, state, top, kind, hit)
+    return event
+
+
+@jit(forceinline=True)
+def next_on_terrain(world, terrain, state, top, kind, in_film, hit):
+    """`next_of_facets` over a height field, clean or with a film."""
+    film = world.film
     fate = ESCAPED
     conformal = film.kind == CONFORMAL
     if conformal:
@@ -232,25 +255,47 @@ def first_event(world, state, meeting, hit):
 
 
 @jit(forceinline=True)
+def place_of_hit(terrain, mesh, hit):
+    """Give the place (x, y) of the facet just met."""
+    x, y = hit[HIT_U], hit[HIT_V]
+    if terrain is not None:
+        x = (hit[HIT_I] + x) * terrain.pitch_x
+        y = (hit[HIT_J] + y) * terrain.pitch_y
+    return x, y
+
+
+@jit(forceinline=True)
+def repeats(terrain, mesh):
+    """Whether the surface repeats, and its lengths."""
+    periodic, size_x, size_y = False, 0.0, 0.0
+    if terrain is not None:
+        nx, ny = cell_counts(terrain)
+        periodic = terrain.periodic
+        size_x, size_y = nx * terrain.pitch_x, ny * terrain.pitch_y
+    if mesh is not None:
+        periodic = mesh.frame.periodic
+        size_x, size_y = mesh.frame.period_x, mesh.frame.period_y
+    return periodic, size_x, size_y
+
+
+@jit(forceinline=True)
 def move_beam(world, state, top, kind, hit):
     """Take the beam to where the event is, round the period if need be."""
-    terrain = world.terrain
     x = state[top, X] + hit[HIT_T] * state[top, KX]
     y = state[top, Y] + hit[HIT_T] * state[top, KY]
     z = state[top, Z] + hit[HIT_T] * state[top, KZ]
-    nx, ny = cell_counts(terrain)
-    size_x = nx * terrain.pitch_x
-    size_y = ny * terrain.pitch_y
+    periodic, size_x, size_y = repeats(world.terrain, world.mesh)
     new_x, new_y = x, y
-    facet = kind == GROUND or (kind in (FILM_DOWN, FILM_UP) and hit[HIT_FACET] >= 0.0)
+    facet = kind in (GROUND, SOLID_IN, SOLID_OUT) or (
+        kind in (FILM_DOWN, FILM_UP) and hit[HIT_FACET] >= 0.0
+    )
     if facet:
-        new_x = (hit[HIT_I] + hit[HIT_U]) * terrain.pitch_x
-        new_y = (hit[HIT_J] + hit[HIT_V]) * terrain.pitch_y
+        new_x, new_y = place_of_hit(world.terrain, world.mesh, hit)
         z = hit[HIT_Z]
-    elif terrain.periodic:
+    elif periodic:
         new_x = x - size_x * math.floor(x / size_x)
         new_y = y - size_y * math.floor(y / size_y)
-    if terrain.periodic:
+    if periodic:
         shift_x = size_x * math.floor((new_x - x) / size_x + 0.5)
         shift_y = size_y * math.floor((new_y - y) / size_y + 0.5)
         if shift_x != 0.0 or shift_y != 0.0:
@@ -263,7 +308,7 @@ def move_beam(world, state, top, kind, hit):
     state[top, START] = FREE
     state[top, LEFT] = NOTHING
     if facet:
-        state[top, START] = ON_GROUND if kind == GROUND else ON_FILM
+        state[top, START] = ON_FILM if kind in (FILM_DOWN, FILM_UP) else ON_GROUND
         state[top, CELL_I] = hit[HIT_I]
         state[top, CELL_J] = hit[HIT_J]
         state[top, FACET] = hit[HIT_FACET]
@@ -281,6 +326,25 @@ def move_beam(world, state, top, kind, hit):
 
 
 @jit(forceinline=True)
+def normal_of_facet(terrain, mesh, state, top):
+    """Give the normal of the facet that the beam is on; that of a level film is upright."""
+    normal = Vec(0.0, 0.0, 1.0)
+    if terrain is not None:
+        slope_x = 0.0
+        slope_y = 0.0
+        if state[top, FACET] >= 0.0:
+            slope_x, slope_y = facet_slopes(
+                terrain, int(state[top, CELL_I]), int(state[top, CELL_J]),
+                int(state[top, FACET]),
+            )  # fmt: skip
+        normal, _ = normal_of_slopes(slope_x, slope_y)
+    if mesh is not None:
+        n_x, n_y, n_z = facet_normal(mesh, int(state[top, FACET]))
+        normal = Vec(n_x, n_y, n_z)
+    return normal
+
+
+@jit(forceinline=True)
 def normal_at(world, state, top, kind, hit):
     """Find the normal of the surface just met, towards the beam."""
     if kind in (BODY_IN, BODY_OUT):
@@ -291,15 +355,8 @@ def normal_at(world, state, top, kind, hit):
         )  # fmt: skip
         normal = Vec(n_x, n_y, n_z)
         return opposite(normal) if kind == BODY_OUT else normal
-    slope_x = 0.0
-    slope_y = 0.0
-    if state[top, FACET] >= 0.0:
-        slope_x, slope_y = facet_slopes(
-            world.terrain, int(state[top, CELL_I]), int(state[top, CELL_J]),
-            int(state[top, FACET]),
-        )  # fmt: skip
-    normal, _ = normal_of_slopes(slope_x, slope_y)
-    return opposite(normal) if kind == FILM_UP else normal
+    normal = normal_of_facet(world.terrain, world.mesh, state, top)
+    return opposite(normal) if kind in (FILM_UP, SOLID_OUT) else normal
 
 
 @jit(forceinline=True)
@@ -310,12 +367,16 @@ def set_rate(state, top, normal):
 
 
 @jit(forceinline=True)
+def number_of(kind, hit):
+    """Give the number of the body, solid or film whose surface has just been met."""
+    return FILM if kind in (FILM_DOWN, FILM_UP) else hit[HIT_BODY]
+
+
+@jit(forceinline=True)
 def cross(world, state, top, kind, hit):
     """Note that the beam has crossed the surface just met; False if it cannot be noted."""
-    number = FILM
-    if kind in (BODY_IN, BODY_OUT):
-        number = hit[HIT_BODY]
-    if kind in (BODY_IN, FILM_DOWN):
+    number = number_of(kind, hit)
+    if kind in (BODY_IN, SOLID_IN, FILM_DOWN):
         return enter_body(state, top, number, hit[HIT_X], hit[HIT_Y])
     slot = inside_slot(state, top, number, hit[HIT_X], hit[HIT_Y])
     if slot >= 0:

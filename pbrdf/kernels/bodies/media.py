@@ -9,7 +9,8 @@ from pbrdf.kernels import jit
 from pbrdf.kernels.bodies.beams import (
     CELL_I,
     CELL_J,
-    FILM,
+    FACET,
+    FIRST_SOLID,
     INDEX,
     INSIDE,
     KX,
@@ -20,9 +21,11 @@ from pbrdf.kernels.bodies.beams import (
     Y,
     Z,
     inside_slot,
+    solid_of_number,
 )
 from pbrdf.kernels.bodies.bodies import HIT_X, HIT_Y, body_interval
-from pbrdf.kernels.bodies.events import (
+from pbrdf.kernels.bodies.events import number_of
+from pbrdf.kernels.bodies.world import (
     BODY_IN,
     BODY_OUT,
     FILM_DOWN,
@@ -31,7 +34,10 @@ from pbrdf.kernels.bodies.events import (
     HIT_BODY,
     LEVEL,
     NO_FILM,
+    SOLID_IN,
+    SOLID_OUT,
 )
+from pbrdf.kernels.meshes.facets import facet_label
 from pbrdf.kernels.optics.absorbing import interface_elements, normal_wave
 from pbrdf.kernels.optics.fresnel import reflection_elements, transmission_elements
 from pbrdf.kernels.optics.light import GRAZING, cosine_law
@@ -41,14 +47,22 @@ DEEP = 36.9
 
 
 @jit(forceinline=True)
+def medium_named(world, mesh, number):
+    """Medium of a body, a film or a solid of the mesh, by its number."""
+    medium = world.film.medium
+    if number >= 0.0:
+        medium = world.bodies.medium[int(number)]
+    if mesh is not None and number <= FIRST_SOLID:
+        medium = mesh.media[solid_of_number(number)]
+    return medium
+
+
+@jit(forceinline=True)
 def medium_of(world, state, top):
     """Medium the beam is in: of all that holds it, the one named first in the scene."""
     medium = 0
     for slot in range(int(state[top, N_INSIDE])):
-        number = state[top, INSIDE + 3 * slot]
-        other = world.film.medium
-        if number != FILM:
-            other = world.bodies.medium[int(number)]
+        other = medium_named(world, world.mesh, state[top, INSIDE + 3 * slot])
         if medium == 0 or other < medium:
             medium = other
     return medium
@@ -56,29 +70,41 @@ def medium_of(world, state, top):
 
 @jit(forceinline=True)
 def medium_behind(world, state, top, kind, hit):
-    """Medium on the far side of the surface of a body or film just met."""
-    film, bodies = world.film, world.bodies
-    if kind in (BODY_IN, FILM_DOWN):
+    """Medium on the far side of the surface of a body, solid or film just met."""
+    number = number_of(kind, hit)
+    if kind in (BODY_IN, SOLID_IN, FILM_DOWN):
         before = medium_of(world, state, top)
-        new = film.medium
-        if kind == BODY_IN:
-            new = bodies.medium[int(hit[HIT_BODY])]
+        new = medium_named(world, world.mesh, number)
         return new if before == 0 or new < before else before
-    number = FILM
-    if kind == BODY_OUT:
-        number = hit[HIT_BODY]
     left = inside_slot(state, top, number, hit[HIT_X], hit[HIT_Y])
     medium = 0
     for slot in range(int(state[top, N_INSIDE])):
         if slot == left:
             continue
-        number = state[top, INSIDE + 3 * slot]
-        other = film.medium
-        if number != FILM:
-            other = bodies.medium[int(number)]
+        other = medium_named(world, world.mesh, state[top, INSIDE + 3 * slot])
         if medium == 0 or other < medium:
             medium = other
     return medium
+
+
+@jit(forceinline=True)
+def free_way(terrain, mesh, z, k_z):
+    """Distance below which a ray from a height z meets no facet; < 0 if none is known."""
+    way = math.inf
+    if terrain is not None and k_z < 0.0:
+        way = (terrain.z_top - z) / k_z
+    if mesh is not None and (k_z < 0.0 or z < mesh.frame.z_high):
+        way = (mesh.frame.z_high - z) / -abs(k_z)
+    return way
+
+
+@jit(forceinline=True)
+def steepest_of(terrain):
+    """Slope of the steepest facet, under a film."""
+    steepest = math.inf
+    if terrain is not None:
+        steepest = terrain.steepest
+    return steepest
 
 
 @jit(forceinline=True)
@@ -87,7 +113,7 @@ def least_way(world, state, top, kind, hit):
 
     0 where none is known without a search. For the skip of what is too deep to come out.
     """
-    terrain, film, bodies = world.terrain, world.film, world.bodies
+    film, bodies = world.film, world.bodies
     k_x, k_y, k_z = state[top, KX], state[top, KY], state[top, KZ]
     if kind == BODY_IN:
         if state[top, N_INSIDE] > 0.0 or bodies.overlap or film.kind != NO_FILM:
@@ -97,15 +123,14 @@ def least_way(world, state, top, kind, hit):
             bodies, k, state[top, X] - hit[HIT_X], state[top, Y] - hit[HIT_Y],
             state[top, Z] - bodies.z[k], k_x, k_y, k_z,
         )  # fmt: skip
-        if k_z < 0.0:
-            way = min(way, (terrain.z_top - state[top, Z]) / k_z)
-        return max(way, 0.0)
+        return max(min(way, free_way(world.terrain, world.mesh, state[top, Z], k_z)), 0.0)
     if kind != FILM_DOWN or bodies.medium.size > 0:
         return 0.0
     if film.kind == LEVEL:
-        return max((terrain.z_top - film.height) / k_z, 0.0) if k_z < 0.0 else 0.0
+        way = free_way(world.terrain, world.mesh, film.height, k_z)
+        return max(way, 0.0) if k_z < 0.0 else 0.0
     # Between two copies of a surface, unless the beam may come out of the upper again
-    steepest = terrain.steepest
+    steepest = steepest_of(world.terrain)
     if -k_z <= steepest * math.sqrt(k_x * k_x + k_y * k_y):
         return 0.0
     return film.height / math.sqrt(1.0 + steepest * steepest)
@@ -150,14 +175,24 @@ def both_elements(media, w, before, after, index, cos_in):
 
 
 @jit(forceinline=True)
+def label_of_ground(terrain, mesh, state, top):
+    """Give the number of the material of the facet that the beam is on."""
+    label = 0
+    if terrain is not None:
+        labels = terrain.labels
+        if labels.size > 0:
+            label = int(labels[int(state[top, CELL_I]), int(state[top, CELL_J])])
+    if mesh is not None:
+        label = int(facet_label(mesh, int(state[top, FACET])))
+    return label
+
+
+@jit(forceinline=True)
 def solid_at(world, w, state, top, kind, hit):
     """Solid that has just been met; -1 at the surface of what light goes through."""
     if kind == GROUND:
-        labels = world.terrain.labels
-        if labels.size == 0:
-            return 0
-        return int(labels[int(state[top, CELL_I]), int(state[top, CELL_J])])
-    if kind in (BODY_OUT, FILM_UP) and state[top, N_INSIDE] < 2.0:
+        return label_of_ground(world.terrain, world.mesh, state, top)
+    if kind in (BODY_OUT, SOLID_OUT, FILM_UP) and state[top, N_INSIDE] < 2.0:
         return -1
     after = medium_behind(world, state, top, kind, hit)
     solid = world.media.solid[w, after]

@@ -1,8 +1,8 @@
-"""Light among bodies and films on an opaque height field.
+"""Light among bodies and films on an opaque height field or mesh, and in solids of a mesh.
 
-A beam goes from event to event: it enters or leaves a body or the film, or meets something
-opaque, and may come apart there (`pbrdf.kernels.bodies.splitting`). The part at the top of
-the stack is followed to its end, then those below it.
+A beam goes from event to event: it enters or leaves a body, a solid or the film, or meets
+something opaque, and may come apart there (`pbrdf.kernels.bodies.splitting`). The part at
+the top of the stack is followed to its end, then those below it.
 """
 
 from pbrdf.kernels import jit
@@ -25,15 +25,7 @@ from pbrdf.kernels.bodies.beams import (
     Z,
 )
 from pbrdf.kernels.bodies.bodies import HIT_T
-from pbrdf.kernels.bodies.events import (
-    ASIDE,
-    ASTRAY,
-    CONFORMAL,
-    OUT,
-    first_event,
-    move_beam,
-    next_event,
-)
+from pbrdf.kernels.bodies.events import first_event, move_beam, next_event
 from pbrdf.kernels.bodies.interfaces import (
     axis_of_beam,
     set_axis,
@@ -48,11 +40,14 @@ from pbrdf.kernels.bodies.splitting import (
     meet_solid,
     survives,
 )
+from pbrdf.kernels.bodies.world import ASIDE, ASTRAY, CONFORMAL, OUT, PASSED
 from pbrdf.kernels.optics.frames import exit_turn
 from pbrdf.kernels.paths.random import Draw
 from pbrdf.kernels.paths.shading import (
     LEAKED,
+    N_BELOW,
     N_ESCAPED,
+    N_EXACT,
     N_LEAKED,
     N_MISMATCH,
     N_ORDERS,
@@ -60,6 +55,7 @@ from pbrdf.kernels.paths.shading import (
     N_SIDE,
     N_TRUNCATED,
     SIDEWAYS,
+    TRANSMITTED,
     TRUNCATED,
 )
 from pbrdf.kernels.terrain.entry import entry_point, rays_of_line, way_of
@@ -96,6 +92,9 @@ def end_beam(state, top, kind, columns, w, beam, tally):
     elif kind == ASIDE:
         tally.counts[N_SIDE] += 1
         tally.energy[w, SIDEWAYS] += state[top, MUELLER]
+    elif kind == PASSED:
+        tally.counts[N_BELOW] += 1
+        tally.energy[w, TRANSMITTED] += state[top, MUELLER]
     elif kind < OUT:
         tally.counts[N_TRUNCATED] += 1
         tally.energy[w, TRUNCATED] += state[top, MUELLER]
@@ -157,16 +156,26 @@ def follow_beam(world, w, top, kind, draw, beam, max_events, columns, room, tall
 
 
 @jit(forceinline=True)
-def trace_beams(world, w, number, ray, stream, beam, max_events, columns, room, tally):
-    """Follow one ray of a line and all its parts until their light has left or is lost."""
-    swept = room.meetings.size > 0
-    top = 0
-    step = 0
-    while top >= 0:
-        if step == 0 and swept:
+def event_of_step(world, terrain, top, step, ray, room):
+    """Find what the beam meets next; the first facets of a line may be known."""
+    kind = OUT
+    if terrain is None:
+        kind = next_event(world, room.state, top, room.hit)
+    if terrain is not None:
+        if step == 0 and room.meetings.size > 0:
             kind = first_event(world, room.state, room.meetings[ray], room.hit)
         else:
             kind = next_event(world, room.state, top, room.hit)
+    return kind
+
+
+@jit(forceinline=True)
+def trace_beams(world, w, number, ray, stream, beam, max_events, columns, room, tally):
+    """Follow one ray of a line and all its parts until their light has left or is lost."""
+    top = 0
+    step = 0
+    while top >= 0:
+        kind = event_of_step(world, world.terrain, top, step, ray, room)
         draw = Draw(stream, number, 2 * step)
         top = follow_beam(world, w, top, kind, draw, beam, max_events, columns, room, tally)
         step += 1
@@ -202,3 +211,30 @@ def trace_among_bodies(world, source, z_start, max_events, columns, room, tally)
                     world, w, first + ray, ray, source.stream, beam, max_events, columns,
                     room, tally,
                 )  # fmt: skip
+
+
+@jit(allocates=False)
+def trace_on_mesh(world, source, z_top, max_events, columns, room, tally):
+    """`trace_among_bodies` over a mesh: places are micrometres, entry points at z_top.
+
+    Rays start a little before, so that none starts on a facet.
+    """
+    frame = world.mesh.frame
+    margin = frame.z_top - frame.z_high
+    tally.counts[N_EXACT] -= world.mesh.searches[0]
+    for line in range(source.n_lines):
+        beam, first, rays, points = rays_of_line(line, source, 1.0, 1.0)
+        k = way_of(beam)
+        before = margin / beam.cos_t
+        for ray in range(rays):
+            x, y = entry_point(points, ray, rays, source.launch)
+            for w in range(tally.energy.shape[0]):
+                launch_beam(
+                    room.state, x - before * k.x, y - before * k.y, z_top + margin, beam,
+                    columns,
+                )  # fmt: skip
+                trace_beams(
+                    world, w, first + ray, ray, source.stream, beam, max_events, columns,
+                    room, tally,
+                )  # fmt: skip
+    tally.counts[N_EXACT] += world.mesh.searches[0]

@@ -22,14 +22,17 @@ MeshFrame = namedtuple(
     "z_bottom z_top z_high free_slope center_x center_y center_z scale lift tolerance",
 )
 # A mesh: corners (vertices, 3) [um], faces (faces, 3), unit normals (faces, 3), labels
-# (faces,; of no size: all 0) and its frame; then Embree: addresses of `rtcIntersect1`, of
+# (faces,; of no size: all 0), the number of the transparent solid that each bounds (faces,;
+# 0: none; of no size: all 0) and its frame; the medium of each solid (solids + 1,), 0 of
+# none, and how often a ray is inside of each, of all together last (solids + 2,); then
+# Embree: addresses of `rtcIntersect1`, of
 # `rtcOccluded1`, of the scene, of a ray and of the arguments of an exact search; the ray as
 # float32 and uint32, the periods that each image is moved by (images, 2), and what the
 # search asks and finds (N_QUERY,) and how often it ran (1,)
 Facets = namedtuple(
     "Facets",
-    "corners faces normals labels frame intersect occluded scene place arguments ray words "
-    "images query searches",
+    "corners faces normals labels solids frame media within intersect occluded scene place "
+    "arguments ray words images query searches",
 )
 
 
@@ -52,6 +55,13 @@ def facet_label(mesh, face):
     """Give the number of the material of a facet."""
     labels = mesh.labels
     return labels[face] if labels.size > 0 else 0
+
+
+@jit(forceinline=True)
+def facet_solid(mesh, face):
+    """Give the number of the transparent solid that a facet bounds, or 0."""
+    solids = mesh.solids
+    return solids[face] if solids.size > 0 else 0
 
 
 @jit(forceinline=True)

@@ -5,6 +5,9 @@ through an edge or a vertex, what it finds first may be the wrong side of a face
 just left, or nothing. Such a ray is asked for again: from a little behind its start and a
 little beside its line, with a call back for every facet near the line, which is judged with
 the true ray and the true corners. No candidate is accepted, so none hides another.
+
+A facet is met from the front; from behind only as the way out of a solid that light goes
+through and the ray is inside of. Any other back tells that the ray has strayed.
 """
 
 import math
@@ -20,13 +23,14 @@ from pbrdf.kernels.meshes.memory import (
 )
 
 # Columns of a query: true start and direction of the ray; facet it leaves (or -1) and the
-# middle of that; tolerance of places, from planes and across edges; then what was found:
-# time, facet and image of the nearest front, and time of the nearest back
+# middle of that; tolerance of places, from planes and across edges, and that of float64;
+# then what was found: time, facet and image of the nearest facet that may be met, and time
+# of the nearest back that may not
 Q_X, Q_Y, Q_Z, Q_KX, Q_KY, Q_KZ, Q_FROM, Q_MX, Q_MY, Q_MZ = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
-Q_NEAR, Q_TIME, Q_FACE, Q_IMAGE, Q_BACK, N_QUERY = 10, 11, 12, 13, 14, 15
+Q_NEAR, Q_TIGHT, Q_TIME, Q_FACE, Q_IMAGE, Q_BACK, N_QUERY = 10, 11, 12, 13, 14, 15, 16
 # Bytes from the context of a query to these columns, and from them to the addresses of
-# corners, faces, normals and images
-AT_QUERY, AT_ADDRESSES = 64, 64 + 8 * N_QUERY
+# corners, faces, normals, images, solids (0: none) and the counts of solids
+AT_QUERY, AT_ADDRESSES, N_ADDRESSES = 64, 64 + 8 * N_QUERY, 6
 # Bytes of Embree's C structs: of RTCFilterFunctionNArguments and of RTCHit
 VALID, CONTEXT, HIT = 0, 16, 32
 HIT_FACE, HIT_INSTANCE = 20, 28
@@ -69,18 +73,23 @@ def judge(given):
     z = read_float64(query + 8 * Q_Z) - a_z
     height = x * n_x + y * n_y + z * n_z
     near = read_float64(query + 8 * Q_NEAR)
-    if height < -near if rate < 0.0 else height > -near:
+    inside = is_inside(context, face)
+    leaves = rate > 0.0 and inside
+    if rate < 0.0:
+        # Inside of the solid already, it has met what it is a hair behind of
+        if height < -(read_float64(query + 8 * Q_TIGHT) if inside else near):
+            return
+    elif height > (near if leaves else -near):
         return
     left = int(read_float64(query + 8 * Q_FROM))
-    if rate < 0.0 and height <= near and left >= 0 and share_corner(faces, face, left):
-        # The ray starts on this facet too: met only where the two form a hollow edge, as
-        # those of bodies that cut into each other always do
-        front = (
-            (read_float64(query + 8 * Q_MX) - base_x) * n_x
-            + (read_float64(query + 8 * Q_MY) - base_y) * n_y
-            + (read_float64(query + 8 * Q_MZ) - a_z) * n_z
-        )
-        if front <= 0.0:
+    starts_here = height <= near if rate < 0.0 else leaves and height >= -near
+    if starts_here and left >= 0 and share_corner(faces, face, left):
+        # The ray starts on this facet too: met only where the two form an edge that is
+        # hollow on the side of the ray, as those of bodies that cut into each other always
+        # do. On one side of a body only its fronts are met, on the other its backs
+        front = height_of_middle(query, base_x, base_y, a_z, n_x, n_y, n_z)
+        hollow = front < 0.0 if leaves else front > 0.0
+        if goes_in(context, query, left) != leaves or not hollow:
             return
     time = max(-height / rate, 0.0)
     x += time * k_x
@@ -104,17 +113,52 @@ def judge(given):
         ),
         inside_edge(x - v_x, y - v_y, z - v_z, -v_x, -v_y, -v_z, n_x, n_y, n_z),
     )
-    # A front is met up to its edges; a back tells of a fault only well inside of them, as a
-    # ray that grazes an edge may touch both
-    if least < (near if rate > 0.0 else -near):
+    # What may be met is met up to its edges; a back tells of a fault only well inside of
+    # them, as a ray that grazes an edge may touch both. So does the front of a solid that
+    # the ray is inside of, which is met only where the solid cuts into itself
+    met = (rate < 0.0) != inside
+    if least < (-near if met else near):
         return
-    if rate > 0.0:
+    if rate > 0.0 and not leaves:
         if time < read_float64(query + 8 * Q_BACK):
             write_float64(query + 8 * Q_BACK, time)
     elif time < read_float64(query + 8 * Q_TIME):
         write_float64(query + 8 * Q_TIME, time)
         write_float64(query + 8 * Q_FACE, float(face))
         write_float64(query + 8 * Q_IMAGE, float(image))
+
+
+@jit(forceinline=True)
+def height_of_middle(query, x, y, z, n_x, n_y, n_z):
+    """Height of the middle of the facet that a ray leaves above a plane through a place."""
+    return (
+        (read_float64(query + 8 * Q_MX) - x) * n_x
+        + (read_float64(query + 8 * Q_MY) - y) * n_y
+        + (read_float64(query + 8 * Q_MZ) - z) * n_z
+    )
+
+
+@jit(forceinline=True)
+def is_inside(context, face):
+    """Whether the ray of a query is inside of the solid that a facet bounds."""
+    solids = read_int64(context + AT_ADDRESSES + 32)
+    within = read_int64(context + AT_ADDRESSES + 40)
+    solid = int(read_uint32(solids + 4 * face)) if solids != 0 else 0
+    return read_int64(within + 8 * solid) > 0
+
+
+@jit(forceinline=True)
+def goes_in(context, query, left):
+    """Whether the ray of a query starts to the inner side of the facet that it leaves."""
+    if not is_inside(context, left):
+        return False
+    normal = read_int64(context + AT_ADDRESSES + 16) + 24 * left
+    along = (
+        read_float64(query + 8 * Q_KX) * read_float64(normal)
+        + read_float64(query + 8 * Q_KY) * read_float64(normal + 8)
+        + read_float64(query + 8 * Q_KZ) * read_float64(normal + 16)
+    )
+    return along < 0.0
 
 
 @jit(forceinline=True)
@@ -160,6 +204,7 @@ def pose_query(mesh, face, x, y, z, k_x, k_y, k_z, near):
                 middle += mesh.corners[mesh.faces[face, corner], axis]
             query[Q_MX + axis] = middle / 3.0
     query[Q_NEAR] = near
+    query[Q_TIGHT] = mesh.frame.tolerance
     query[Q_TIME] = math.inf
     query[Q_FACE] = -1.0
     query[Q_IMAGE] = 0.0

@@ -10,7 +10,7 @@ from collections import namedtuple
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.bins.binning import bin_of_direction
-from pbrdf.kernels.meshes.seek import BELOW, WRONG
+from pbrdf.kernels.meshes.shots import BELOW, WRONG
 from pbrdf.kernels.optics.frames import exit_turn, kept_axis, turn_frame
 from pbrdf.kernels.optics.fresnel import reflection_elements
 from pbrdf.kernels.optics.light import GRAZING

@@ -26,11 +26,16 @@ BELOW = 1e-4
 
 
 class Sided(NamedTuple):
-    """A mesh whose faces look out of the solid, and what kind of mesh it is."""
+    """A mesh whose faces look out of the solid, and what kind of mesh it is.
+
+    `body` numbers the part that each face belongs to; `closed` says of each part whether it
+    is a closed body, or a layer of a mesh that is closed towards below.
+    """
 
     mesh: Mended
     kind: str
-    bodies: int
+    body: np.ndarray
+    closed: np.ndarray
 
 
 def with_sides(mesh: Mended, period: tuple[float, float] | None) -> Sided:
@@ -95,7 +100,9 @@ def with_sides(mesh: Mended, period: tuple[float, float] | None) -> Sided:
         vertices=vertices, faces=faces, labels=mesh.labels, source=mesh.source,
         notes=tuple(notes),
     )  # fmt: skip
-    return Sided(done, kind, int(body.max()) + 1)
+    closed = np.ones(int(body.max()) + 1, dtype=bool)
+    closed[body[edges.face[open_edges]]] = False
+    return Sided(done, kind, body, closed)
 
 
 def _turned_out(

@@ -1,6 +1,8 @@
 """A surface of triangles, overhangs included."""
 
+import copy
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +16,7 @@ from pbrdf.surface.heightmap import HeightMap
 from pbrdf.surface.mesh.mending import checked_arrays, mend, without_flat_faces
 from pbrdf.surface.mesh.reading import Raw, micrometres, raw_mesh
 from pbrdf.surface.mesh.sides import with_sides
+from pbrdf.surface.mesh.solids import transparent_solids
 from pbrdf.surface.mesh.topology import face_vectors
 
 # Labels of faces by the part of a file that they come from
@@ -22,7 +25,7 @@ PARTS = "parts"
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class MeshSurface:
-    """Triangles that look out of an opaque solid; they may hang over and hide each other.
+    """Triangles that look out of a solid; they may hang over and hide each other.
 
     Parameters
     ----------
@@ -36,6 +39,10 @@ class MeshSurface:
         Number of the material of each face, or those of the parts of a file in their order.
     unit : {"um", "nm", "mm", "cm", "m", "inch"}, optional
         Unit of the numbers in `mesh`; `period` stays in micrometres.
+    transparent : bool or sequence of int
+        Labels of closed solids that light goes through, True for all; it is refracted by
+        them, weakened in them and comes out again. What enters the others is absorbed, or
+        scattered by their diffuse base.
 
     Attributes
     ----------
@@ -48,6 +55,13 @@ class MeshSurface:
         nothing under them; or an open sheet.
     parts : int
         Number of parts that hang together.
+    transparent : tuple of int
+        Labels of the solids that light goes through.
+    solids : ndarray of int, shape (faces,), or None
+        Number, from 1 on, of the solid that light goes through and each face bounds; 0
+        where a face is opaque, None where all are.
+    solid_labels : tuple of int
+        Label of each of these solids.
     repairs : tuple of str
         What was mended, with counts and places; each is also a warning.
 
@@ -57,7 +71,7 @@ class MeshSurface:
         If a file is damaged or its mesh is one that this class refuses.
     TypeError, ValueError
         If the mesh has holes, one-sided parts, faces back to back, a wrong period, vertices
-        that are not finite; or a label is missing.
+        that are not finite; a label is missing; or what shall be transparent is not closed.
 
     Warns
     -----
@@ -79,6 +93,9 @@ class MeshSurface:
     kind: str
     repairs: tuple[str, ...] = field(repr=False)
     parts: int = field(repr=False)
+    transparent: tuple[int, ...]
+    solids: np.ndarray | None = field(repr=False)
+    solid_labels: tuple[int, ...] = field(repr=False)
 
     def __init__(
         self,
@@ -87,11 +104,12 @@ class MeshSurface:
         labels: npt.ArrayLike | str | None = None,
         *,
         unit: str | None = None,
+        transparent: bool | Sequence[int] = False,
     ) -> None:
         raw = raw_mesh(mesh)
         lengths = None if period is None else _checked_period(period)
         try:
-            self._build(raw, lengths, labels, micrometres(unit, raw.unit))
+            self._build(raw, lengths, labels, micrometres(unit, raw.unit), transparent)
         except DataFileError:
             raise
         except (TypeError, ValueError) as error:
@@ -108,6 +126,7 @@ class MeshSurface:
         period: tuple[float, float] | None,
         labels: npt.ArrayLike | str | None,
         unit: float,
+        transparent: bool | Sequence[int],
     ) -> None:
         vertices, faces = checked_arrays(raw.vertices, raw.faces)
         if _is_parts(labels):
@@ -119,20 +138,26 @@ class MeshSurface:
         done = without_flat_faces(sided.mesh)
         if period is not None:
             _check_extent(done.vertices, period)
+        clear = transparent_solids(transparent, sided, period)
+        solids = None
+        if clear.labels:
+            solids = clear.number[np.isin(sided.mesh.source, done.source)]
         table = done.faces.astype(np.int32)
-        for array in (done.vertices, table, done.labels):
+        for array in (done.vertices, table, done.labels, solids):
             if array is not None:
                 array.setflags(write=False)
         for name, value in (
             ("vertices", done.vertices), ("faces", table), ("labels", done.labels),
             ("period", period), ("kind", sided.kind), ("repairs", done.notes),
-            ("parts", sided.bodies),
+            ("parts", len(sided.closed)), ("solids", solids),
+            ("solid_labels", clear.labels), ("transparent", tuple(sorted({*clear.labels}))),
         ):  # fmt: skip
             object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
         lies = "alone" if self.period is None else f"period={self.period} um"
-        return f"MeshSurface({len(self.faces)} faces, {self.kind}, {lies})"
+        clear = ", light goes through" if self.transparent else ""
+        return f"MeshSurface({len(self.faces)} faces, {self.kind}, {lies}{clear})"
 
     @classmethod
     def of_map(cls, surface: HeightMap) -> "MeshSurface":
@@ -182,6 +207,20 @@ class MeshSurface:
             face_vectors(self.vertices, self.faces), axis=1
         )
         return areas
+
+    @property
+    def periodic(self) -> bool:
+        """Whether the mesh repeats."""
+        return self.period is not None
+
+    def moved(self, shift: npt.ArrayLike) -> "MeshSurface":
+        """Return the same mesh, moved along x and y. [um]"""
+        other = copy.copy(self)
+        other.__dict__.pop("bounds", None)
+        vertices = self.vertices + np.append(np.asarray(shift, dtype=float), 0.0)
+        vertices.setflags(write=False)
+        object.__setattr__(other, "vertices", vertices)
+        return other
 
     @property
     def size(self) -> tuple[float, float]:
