@@ -80,7 +80,8 @@ def scene_of(document: Mapping[str, Any], source: Path) -> Scene:
 def _read_surface(table: dict[str, Any], source: Path) -> Surface:
     kind = kind_of(table, SURFACE_KEYS, "surface", source)
     check_keys(table, SURFACE_KEYS[kind], "surface", source)
-    check_numbers(table, SURFACE_KEYS[kind] - _WORDS, "surface", source)
+    words = _WORDS | {"labels"} if kind == "mesh" else _WORDS
+    check_numbers(table, SURFACE_KEYS[kind] - words, "surface", source)
     if kind == "flat":
         return HeightMap.flat(size=_pair(table.get("size_um", 1.0)))
     if kind == "mesh":

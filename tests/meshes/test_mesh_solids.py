@@ -150,6 +150,16 @@ def test_a_hollow_and_a_core_of_the_same_glass():
     assert_within(light[2], np.hypot(error[2], error[0]), light[0])
     # A bubble reflects more
     assert light[1].sum() > 1.05 * light[0].sum()
+    # The lowest label rules: a core of the index of air is a bubble, or not there
+    core = joined(pair(ball()), pair(ball(2, 0.5 * RADIUS), (0.02, 0.01, 0.05)))
+    for label, materials, same in (
+        (0, [glass, Material(1.0)], 0), (1, [Material(1.0), glass], 1),
+    ):  # fmt: skip
+        labels = np.repeat([label, 1 - label], [1280, 320])
+        mesh = MeshSurface(core, None, labels, transparent=True)
+        one = simulate(Scene(mesh, materials), 0.3, seed=8, **options)
+        both = np.hypot(error[same], one.albedo_stderr.values.ravel())
+        assert_within(light[same], both, one.albedo.values.ravel())
 
 
 def test_many_wavelengths_are_what_each_is_alone():
@@ -214,6 +224,8 @@ def test_scene_files_keep_what_is_transparent(tmp_path):
             "gap of air",
         ),
         (lambda: MeshSurface(ball(1), transparent=[1]), "labels of the mesh, got 1"),
+        (lambda: MeshSurface(ball(1), transparent="yes"), "labels of the mesh, got 'yes'"),
+        (lambda: MeshSurface(ball(1), transparent=1.5), "labels of the mesh, got 1.5"),
         (
             lambda: Scene(MeshSurface(ball(1), transparent=True), Material.mirror()),
             "light goes through for label 0",

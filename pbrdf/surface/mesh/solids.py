@@ -1,7 +1,7 @@
 """Solids of a mesh that light goes through: which they are, and whether they are closed."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -61,7 +61,9 @@ def transparent_solids(
 def _chosen(transparent: bool | Sequence[int], known: list[int]) -> tuple[int, ...]:
     if isinstance(transparent, bool | np.bool_):
         return tuple(known) if transparent else ()
-    numbers = [transparent] if isinstance(transparent, int) else list(transparent)
+    several = isinstance(transparent, Sequence | np.ndarray | set)
+    several = several and not isinstance(transparent, str)
+    numbers: list[Any] = list(transparent) if several else [transparent]
     for one in numbers:
         if isinstance(one, bool) or not isinstance(one, int | np.integer):
             msg = (
