@@ -11,6 +11,7 @@ from fitting.prediction.comparison import Misfit, misfit
 from fitting.prediction.density import slope_table
 from fitting.prediction.facets import facets_of
 from fitting.prediction.prediction import Prediction
+from fitting.prediction.random_phases import redrawn
 from fitting.statistics.slopes import SlopeDistribution, slope_distribution
 from pbrdf import HeightMap, Material, MicrofacetModel, Scene, simulate
 from pbrdf.analytic.slope_table import SlopeTable
@@ -26,6 +27,7 @@ GAUSSIAN = "Gaussian slopes"
 MEASURED = "slopes as measured"
 ENSEMBLE = "Monte Carlo over Gaussian surfaces"
 OVER_MAP = "Monte Carlo over the map"
+REDRAWN = "Monte Carlo over a surface of its heights and spectrum"
 # Fewer readings tell nothing of a distribution
 _FEWEST = 12
 # Share of the peak above which bins of both simulations are compared
@@ -48,17 +50,18 @@ class MeasuredSlopes:
         scan has too few readings of M00.
     simulation : Dataset
         Monte Carlo over the map itself, holes filled, its mean plane taken off.
-    apart, noise : float
-        Rms difference of M00 between that and the Gaussian surfaces, over the latter, in
-        bins above a twentieth of the peak; and what the noise of both adds to it. [1]
+    apart, noise : mapping of str to float
+        Rms difference of M00 between that and the Gaussian surfaces, and a surface with the
+        map's own heights and spectrum, over the latter, in bins above a twentieth of the
+        peak; and what the noise of both adds to it. [1]
     """
 
     slopes: SlopeDistribution
     table: SlopeTable
     misfits: Mapping[str, Misfit]
     simulation: xr.Dataset
-    apart: float
-    noise: float
+    apart: Mapping[str, float]
+    noise: Mapping[str, float]
 
     @property
     def texts(self) -> Iterator[str]:
@@ -71,11 +74,12 @@ class MeasuredSlopes:
                 f"{self.misfits[better].gain_free:.0%} rms, {worse} by "
                 f"{self.misfits[worse].gain_free:.0%} (gain and Lambertian base free)"
             )
-        own = np.sqrt(max(self.apart**2 - self.noise**2, 0.0))
-        yield (
-            f"the {OVER_MAP} differs from the {ENSEMBLE} by {own:.0%} rms in M00, beyond "
-            f"a noise of {self.noise:.0%}"
-        )
+        for name, apart in self.apart.items():
+            own = np.sqrt(max(apart**2 - self.noise[name] ** 2, 0.0))
+            yield (
+                f"the {OVER_MAP} differs from the {name} by {own:.0%} rms in M00, beyond "
+                f"a noise of {self.noise[name]:.0%}"
+            )
 
     def table_rows(self) -> Iterator[tuple[str, ...]]:
         """Yield curve, error with gain and base free, both, and error as predicted."""
@@ -92,8 +96,8 @@ class MeasuredSlopes:
             "slope_rms_stderr": dict(self.slopes.rms_stderr),
             "slope_rms_seen_by_light": list(self.table.slope_rms),
             "misfit": {name: asdict(off) for name, off in self.misfits.items()},
-            "monte_carlo_apart": self.apart,
-            "monte_carlo_apart_noise": self.noise,
+            "monte_carlo_apart": dict(self.apart),
+            "monte_carlo_apart_noise": dict(self.noise),
             "in_words": list(self.texts),
         }
 
@@ -159,30 +163,38 @@ def measured_slopes(
         model=model, wavelength=wavelength or 1.0, facets=facets, draws=(), notes=()
     )
     brushed = facets.principal[0][0] != facets.principal[0][1]
-    simulation = simulate(
-        Scene(_level(surface), material), ensemble.theta_i.values,
-        phi_i=0.0 if brushed else "uniform", n_theta=ensemble.theta_s.size,
-        n_dphi=ensemble.dphi.size, stokes="linear", **tracing,
+    level = _level(surface)
+    seed = tracing.get("seed") or 0
+    simulation, other = (
+        simulate(
+            Scene(one, material), ensemble.theta_i.values,
+            phi_i=0.0 if brushed else "uniform", n_theta=ensemble.theta_s.size,
+            n_dphi=ensemble.dphi.size, stokes="linear", **tracing,
+        )
+        for one in (level, redrawn(level, seed=seed))
     )  # fmt: skip
     readings = fitted.readings
     readings = readings.isel(reading=readings.observable.values == "M00")
     readings = readings.isel(reading=readings.measured.values > 0)
     misfits = {}
     if readings.sizes["reading"] >= _FEWEST:
-        angles = [readings[name].values for name in ("theta_i", "theta_s", "dphi")]
+        angles = readings.theta_i.values, readings.theta_s.values, readings.dphi.values
         gaussian = MicrofacetModel(material, slope_rms=slope_rms)
         curves = {
             GAUSSIAN: gaussian.brdf(*angles)[..., 0, 0],
             MEASURED: seen.brdf(*angles)[..., 0, 0],
             ENSEMBLE: _read(ensemble, *angles),
             OVER_MAP: _read(simulation, *angles),
+            REDRAWN: _read(other, *angles),
         }
         measured = readings.measured.values
         misfits = {name: misfit(curve, measured) for name, curve in curves.items()}
-    apart, noise = _apart(simulation, ensemble)
+    runs = {ENSEMBLE: ensemble, REDRAWN: other}
+    apart = {name: _apart(simulation, run) for name, run in runs.items()}
     return MeasuredSlopes(
-        slopes=slopes, table=table, misfits=misfits, simulation=simulation, apart=apart,
-        noise=noise,
+        slopes=slopes, table=table, misfits=misfits, simulation=simulation,
+        apart={name: both[0] for name, both in apart.items()},
+        noise={name: both[1] for name, both in apart.items()},
     )  # fmt: skip
 
 

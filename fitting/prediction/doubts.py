@@ -12,7 +12,7 @@ from pbrdf.surface.heightmap import HeightMap
 _SMALL = 0.08
 # Share of the slope that an unknown instrument, or a known one, hides, and is told
 _UNKNOWN = 0.03
-_HIDDEN = 0.1
+_HIDDEN = 0.25
 # Share of a map that was bridged
 _BRIDGED = 0.05
 
@@ -64,7 +64,7 @@ def what_is_open(
     elif facets.hidden > _HIDDEN * rms:
         most = replace(facets, exponent=2.0).hidden
         yield (
-            f"resolution {facets.resolution:.3g} um (standard deviation) hides slopes that "
+            f"spot and smoothing of {facets.resolution:.3g} um together hide slopes that "
             f"light sees on patches of {facets.patch:.3g} um: {facets.hidden:.2g} per axis "
             f"is added, between 0 and {most:.2g}, to an rms of {rms:.3g} in all"
         )

@@ -21,7 +21,9 @@ a distance grow as a power p of it in their variance, and within s they are b, s
 
 is added. Within a smooth hill p = 2, where nothing finer is hidden p = 0; p = 1 between.
 The slopes within r that the map lacks follow from those that it has between r and
-sqrt(2) r, with p = 1: they are 1/(sqrt(2) - 1) as large in their variance.
+sqrt(2) r, with p = 1: they are 1/(sqrt(2) - 1) as large in their variance. What a map holds
+that is finer than the spot of the instrument is noise, and smoothed away first, so that r
+is sqrt(2) times the standard deviation of the point spread.
 """
 
 from collections.abc import Iterator, Sequence
@@ -165,6 +167,11 @@ def facets_of(
         If the map has fewer than 100 cells of known heights, or is flat.
     """
     slopes, known = known_slopes(surface)
+    if resolution > 0:
+        # What is finer than the spot is noise; taken off, the map is as if seen twice
+        once = _Mean(surface, known, (resolution, resolution))
+        slopes = [np.where(known, once(s), 0.0) for s in slopes]
+        resolution *= np.sqrt(2)
     extent = min(n * d for n, d in zip(surface.shape, surface.spacing, strict=True))
     smallest, largest = 0.05 * wavelength, min(_LARGEST * wavelength, extent / 12)
     steps = max(int(np.log(largest / smallest) / np.log(_RATIO)), 0)

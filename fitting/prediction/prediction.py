@@ -63,7 +63,7 @@ class Prediction:
 
     def brdf(
         self, theta_i: npt.ArrayLike, theta_s: npt.ArrayLike, dphi: npt.ArrayLike,
-        *, phi_i: npt.ArrayLike = 0.0,
+        wavelength: float | None = None, *, phi_i: npt.ArrayLike = 0.0,
     ) -> Array:  # fmt: skip
         """Mueller BRDF of one and two bounces; arguments broadcast.
 
@@ -71,6 +71,8 @@ class Prediction:
         ----------
         theta_i, theta_s, dphi : array_like
             As in `MicrofacetModel.brdf`. [rad]
+        wavelength : float, optional
+            Its own, where it is read as any model. [um]
         phi_i : array_like
             Azimuth of the source from the x axis of the map. [rad]
 
@@ -79,6 +81,12 @@ class Prediction:
         ndarray, shape (..., 4, 4)
             [1/sr]
         """
+        if wavelength is not None and wavelength != self.wavelength:
+            msg = (
+                f"wavelength must be that of the prediction, {self.wavelength:g} um, got "
+                f"{wavelength:g}. Predict anew: patches depend on it."
+            )
+            raise ValueError(msg)
         angles = (theta_i, theta_s, dphi)
         once = self.model.brdf(*angles, self.wavelength, phi_i=phi_i)
         return once + self._twice(angles, phi_i)

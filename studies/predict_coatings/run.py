@@ -11,13 +11,17 @@ from pathlib import Path
 import numpy as np
 
 import data_io
-from fitting import predict, surface_statistics
+from fitting import Instrument, predict, surface_statistics
 from fitting.prediction.comparison import misfit
 from fitting.prediction.scan_density import free_density
-from pbrdf import Material, MicrofacetModel
+from pbrdf import HeightMap, Material, MicrofacetModel
 
 INDEX = Material(1.5)
 WAVELENGTH = 0.65
+# Aperture of an objective of such pixels; that of these maps is not stated
+ASSUMED = 0.55
+# Distance over which slopes of places are compared [um]
+FAR = 3.6
 # Map, its step [um], and the scan of the same coating
 PAIRS = (
     ("EC1_1", 0.2268, "ualoft_AnoBlackEC1onAlum"),
@@ -58,6 +62,11 @@ def study(folder: Path, name: str, step: float, scan_name: str) -> None:
         f"  95 % interval holds {inside:.1%}, median high/low {np.median(high / low):.2g}"
     )
     print("  " + "\n  ".join(found.notes))
+    named = predict(
+        surface, INDEX, wavelength=WAVELENGTH, instrument=Instrument(aperture=ASSUMED)
+    )
+    line(f"if the aperture were {ASSUMED}", named.brdf(*angles)[..., 0, 0], measured)
+    print(f"  rms slope over {FAR:g} um: {far_slope(surface):.3f}; {named.notes[0]}")
     best = free_density(*angles, measured, INDEX)
     shares = np.array([0.25, 0.5, 0.75, 0.9])
     patches = np.hypot(found.facets.slope_x, found.facets.slope_y)
@@ -66,6 +75,15 @@ def study(folder: Path, name: str, step: float, scan_name: str) -> None:
         f"{best.diffuse_albedo:.4f}\n  |slope| at 25/50/75/90 %: scan "
         f"{best.quantile(shares).round(2)}, patches {np.quantile(patches, shares).round(2)}"
     )
+
+
+def far_slope(surface: HeightMap) -> float:
+    """Rms slope over a distance that terraces, noise and resolution do not reach. [1]"""
+    steps = round(FAR / surface.spacing[0])
+    heights = surface.heights
+    rises = [heights[steps:] - heights[:-steps], heights[:, steps:] - heights[:, :-steps]]
+    squares = np.concatenate([np.ravel(rise) ** 2 for rise in rises])
+    return float(np.sqrt(np.nanmean(squares)) / (steps * surface.spacing[0]))
 
 
 def line(title: str, curve: np.ndarray, measured: np.ndarray) -> None:

@@ -80,7 +80,7 @@ def test_thin_plate_is_exact_where_the_laplacian_is_even() -> None:
     np.testing.assert_allclose(_thin_plate(holed, (0.5, 0.3)), plane, atol=1e-8)
 
 
-@pytest.mark.parametrize("band", [0.0, 0.12])
+@pytest.mark.parametrize("band", [0.0, 0.2])
 def test_a_flank_wrong_by_a_fringe_is_bridged(band: float) -> None:
     x, y = np.mgrid[:140, :120] * 0.25
     hill = 2.6 * np.exp(-((x - 15) ** 2 / 3.0**2 + (y - 17) ** 2 / 3.6**2) / 2)
@@ -121,23 +121,29 @@ def test_named_instrument_predicts_the_true_surface() -> None:
     assert errors["no"][0] > 2 * errors["named"][0]
 
 
+def rugged(nodes: int, step: float) -> HeightMap:
+    """Slopes whose variance within a distance grows as the distance, p = 1."""
+    rng = np.random.default_rng(5)
+    f = np.hypot(np.fft.fftfreq(nodes, step)[:, None], np.fft.fftfreq(nodes, step))
+    waves = np.fft.fft2(rng.standard_normal((nodes, nodes))) / (0.003 + f**2) ** 1.25
+    heights = np.fft.ifft2(waves).real
+    heights *= 0.35 / np.std(np.diff(heights, axis=0) / step)
+    return HeightMap(heights, step, periodic=True)
+
+
 def test_hidden_slopes_come_back_with_the_resolution() -> None:
     """Roughness with slopes at all scales, p = 1, seen through a point spread."""
-    rng = np.random.default_rng(5)
-    f = np.hypot(np.fft.fftfreq(256, 0.06)[:, None], np.fft.fftfreq(256, 0.06))
-    waves = np.fft.fft2(rng.standard_normal((256, 256))) / (0.02 + f**2) ** 1.25
-    heights = np.fft.ifft2(waves).real
-    heights *= 0.35 / np.std(np.diff(heights, axis=0) / 0.06)
-    sharp = HeightMap(heights, 0.06, periodic=True)
+    sharp = rugged(256, 0.06)
     spread = 0.25
     blurred = HeightMap(
-        ndimage.gaussian_filter(heights, spread / 0.06, mode="wrap"), 0.06, periodic=True
-    )
+        ndimage.gaussian_filter(sharp.heights, spread / 0.06, mode="wrap"), 0.06,
+        periodic=True,
+    )  # fmt: skip
     truth = facets_of(sharp, 0.65).slope_rms
     blind = facets_of(blurred, 0.65).slope_rms
     told = facets_of(blurred, 0.65, resolution=spread).slope_rms
-    assert blind < 0.9 * truth
-    assert abs(told - truth) < 0.4 * abs(blind - truth)
+    assert blind < 0.95 * truth
+    assert abs(told - truth) < 0.5 * abs(blind - truth)
 
 
 def test_hidden_slopes_follow_the_power_of_the_distance() -> None:
@@ -168,15 +174,13 @@ def test_error_of_a_place_is_the_scatter_of_places() -> None:
 
 
 def test_doubts_are_told_with_their_size() -> None:
-    rng = np.random.default_rng(7)
-    rough = ndimage.gaussian_filter(rng.standard_normal((80, 90)), 0.8)
-    surface = HeightMap(0.2 * rough, 0.2)
+    surface = HeightMap(rugged(96, 0.2).heights[:90], 0.2)
     with pytest.warns(
         UserWarning, match=r"not known.* rms 0\.\d+ per axis instead of 0\.\d"
     ):
         fitting.predict(surface, GLASS, wavelength=0.65)
-    with pytest.warns(UserWarning, match=r"hides slopes.*is added, between 0 and 0\.\d"):
-        fitting.predict(surface, GLASS, wavelength=0.65, resolution=0.3)
+    with pytest.warns(UserWarning, match=r"hide slopes.*is added, between 0 and 0\.\d"):
+        fitting.predict(surface, GLASS, wavelength=0.65, resolution=0.4)
     wide = GaussianSurface(
         shape=(256, 256), spacing=1.0, corr_length=16.0, slope_rms=0.2
     ).sample(seed=4)

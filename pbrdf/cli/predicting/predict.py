@@ -180,7 +180,7 @@ def _readings(found: "Prediction", geometry: "xr.Dataset") -> "xr.Dataset":
     import xarray as xr
 
     names = ("theta_i", "theta_s", "dphi")
-    angles = [geometry[name].values for name in names]
+    angles = geometry.theta_i.values, geometry.theta_s.values, geometry.dphi.values
     matrices = found.brdf(*angles)
     low, high = found.interval(*angles)
     data: dict[str, Any] = {
