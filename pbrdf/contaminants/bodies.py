@@ -263,10 +263,13 @@ def _check_extent(ground: Ground, x: np.ndarray, y: np.ndarray, radius: np.ndarr
     )
     if outside.any():
         k = int(np.flatnonzero(outside)[0])
+        what, cure = "map", "map periodic with HeightMap.mirrored()"
+        if isinstance(ground, MeshGround):
+            what, cure = "mesh", "mesh periodic with period="
         msg = (
-            f"bodies must lie inside the finite surface of {lengths[0]:g} x "
+            f"bodies must lie inside the finite {what} of {lengths[0]:g} x "
             f"{lengths[1]:g} um, "
             f"got one of radius {radius[k]:.4g} um about ({x[k]:.4g}, {y[k]:.4g}) um. "
-            "Move it, or make the surface periodic: HeightMap.mirrored(), or period=."
+            f"Move it, or make the {cure}."
         )
         raise ValueError(msg)

@@ -133,7 +133,7 @@ def test_a_sphere_on_a_finite_sheet_wherever_its_corner_is():
         for surface, at in ((flat, [0.45, 0.5]), (sheet, [-6.85, 4.6]))
     ]  # fmt: skip
     agree(*found)
-    with pytest.raises(ValueError, match="inside the finite surface"):
+    with pytest.raises(ValueError, match="inside the finite mesh"):
         place([Spheres.at([[-7.2, 4.6]], radius=radius, material=WATER)], sheet, SEED)
 
 

@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pbrdf import (
     AccuracyWarning,
     DataFileError,
-    Drops,
     GaussianSurface,
     HeightMap,
     Material,
@@ -194,12 +193,6 @@ def test_units_and_labels_of_faces():
     inches = ball()
     inches.units = "inches"
     assert_allclose(MeshSurface(inches).bounds[1, 2], 25400.0)
-
-
-def test_contaminants_on_a_mesh_are_refused_by_name():
-    drops = Drops.at([[1.0, 1.0]], volume=0.1, contact_angle=1.0)
-    with pytest.raises(ValueError, match=r"left out on a MeshSurface, got 1.*Drops"):
-        Scene(MeshSurface(plate(), (10.0, 8.0)), "bk7", drops)
 
 
 @pytest.mark.parametrize("suffix", ["stl", "ply", "obj", "glb", "off"])
