@@ -27,6 +27,7 @@ from pbrdf.files.writing import FULL
 
 __all__ = ["app", "main"]
 
+_TALK = ("--quiet", "--verbose")
 _ROOM = "Make room, or write elsewhere."
 _MEMORY = "Take fewer bins, angles or wavelengths at once (--n-theta, --n-dphi, --stokes)."
 
@@ -75,7 +76,7 @@ def _options(
 ) -> None:
     """Polarised reflectance of real rough surfaces: measured, simulated and fitted.
 
-    --quiet and --verbose stand before the command: pbrdf --quiet simulate scene.toml
+    --quiet and --verbose are of every command: pbrdf simulate scene.toml --quiet
     """
     talk(Talk.QUIET if quiet else Talk.VERBOSE if verbose else Talk.NORMAL)
 
@@ -107,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0, 2 for input that cannot be used, 130 when interrupted. A fault of the program
         itself is not caught. --verbose shows where an error was raised.
     """
-    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    arguments = _talk_first(sys.argv[1:] if arguments is None else arguments)
     remember(arguments)
     talk(Talk.NORMAL)
     with warnings.catch_warnings(), _ending_in_order():
@@ -133,6 +134,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             typer.echo(f"Terminated; {_kept(error)}.", err=True)
             return TERMINATED
     return code if isinstance(code, int) else 0
+
+
+def _talk_first(arguments: Sequence[str]) -> list[str]:
+    """Put --quiet and --verbose, which are of every command, before the command."""
+    said = [word for word in arguments if word in _TALK]
+    return said + [word for word in arguments if word not in _TALK]
 
 
 @contextmanager

@@ -182,3 +182,10 @@ def test_errors_turn_with_the_frame():
 def test_the_self_test_ends_and_finds_nothing():
     # Its glass is nearly flat, a slope at which an integral over slopes would never end
     assert list(self_test()) == []
+
+
+def test_quiet_may_stand_after_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "paint.toml", "--quiet"]) == 0
+    assert talk() is Talk.QUIET
+    talk(Talk.NORMAL)
