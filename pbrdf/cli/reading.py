@@ -197,7 +197,7 @@ def read_store(
     """
     from pbrdf import from_store
 
-    places: dict[str, float | str] = {}
+    places: dict[str, Any] = {}
     for text in at or ():
         name, equals, value = text.partition("=")
         if not equals or not name.strip() or name.strip() in places:
