@@ -71,6 +71,7 @@ def predictions(surface: HeightMap, aperture: float) -> Iterator[tuple[str, Pred
         "sharp, in bands": (digitised(sharp, band), None),
         "interferometer, not named": (seen, None),
         "interferometer, named": (seen, instrument),
+        "interferometer, in bands, not named": (digitised(seen, band), None),
         "interferometer, in bands, named": (digitised(seen, band), instrument),
     }
     for name, (one, by) in maps.items():
