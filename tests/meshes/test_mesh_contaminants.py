@@ -102,6 +102,9 @@ def test_bodies_on_a_rough_mesh_as_on_the_map_of_its_facets():
     one, other = (place(lying, surface, SEED) for surface in (ROUGH, mesh))
     # Spheres touch the same facets; a drop is laid by samples of the surface
     assert_allclose(other.bodies.z[:2], one.bodies.z[:2], atol=1e-12)
+    kept = other.bodies.shape(2)
+    above = Ground(ROUGH).volume_above(kept, 7.0, 5.0, other.bodies.z[2], 2048).volume
+    assert above == pytest.approx(6.0, rel=3e-4)
     assert other.bodies.z[2] == pytest.approx(one.bodies.z[2], abs=2e-4)
     for a, b in zip(one.reports, other.reports, strict=True):
         assert b["volume_placed"] == pytest.approx(a["volume_placed"], rel=3e-3)
