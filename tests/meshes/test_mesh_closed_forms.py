@@ -233,7 +233,9 @@ def test_light_through_a_porous_sheet_is_transmitted():
 
 
 @pytest.mark.filterwarnings(
-    "ignore:The tangent plane errs", "ignore:.*such roughness diffracts"
+    "ignore:The tangent plane errs",
+    "ignore:.*such roughness diffracts",
+    "ignore:.*of the surface is flat",
 )
 def test_many_wavelengths_take_one_trace():
     waves = np.linspace(0.4, 0.9, 12)
