@@ -92,7 +92,7 @@ GLASS = "[substrate]\nn = 1.5\n"
         (FLAT + "[substrate]\nindex = 1.5\n", "unknown key 'index'"),
         (FLAT + "[substrate]\nkappa = 1.5\n", "key 'n' is missing"),
         (FLAT + "[substrate]\nn = 1.5\nkappa = -1\n", "kappa must be >= 0"),
-        (FLAT + '[substrate]\nn = "glass"\n', "n must be real numbers"),
+        (FLAT + '[substrate]\nn = "glass"\n', ".n. holds .glass."),
         (FLAT + '[substrate]\nn = 1.0\nabsorbs_all = "yes"\n', "must be true or false"),
         (FLAT + "[substrate]\nn = 1.5\nname = 3\n", "name must be a text"),
         (FLAT + '[substrate]\nmaterial = "unobtainium"\n', "must be one of"),
