@@ -18,7 +18,7 @@ MOST_DOTS = 500
 def read_toml(source: str | Path) -> dict[str, Any]:
     """Parse a TOML file, or raise a DataFileError that says what is wrong with it."""
     try:
-        text = read_bounded(source, MOST_BYTES).decode("utf-8")
+        text = read_bounded(source, MOST_BYTES).decode("utf-8-sig")
         dots = sum(
             line.partition("=")[0].count(".") for line in text.splitlines() if "=" in line
         )

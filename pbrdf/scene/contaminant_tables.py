@@ -94,6 +94,12 @@ def read_contaminant(table: Mapping[str, Any], source: Path) -> Drops | Spheres 
     check_keys(table, contaminant_keys(kind), f"{PLACE} {kind}", source)
     check_present(table, _NEEDED[kind], f"{PLACE} {kind}", source)
     check_numbers(table, _KEYS[kind], f"{PLACE} {kind}", source)
+    angle = table.get("contact_angle_deg", 0.0)
+    if not isinstance(angle, list) and not 0.0 <= angle <= 180.0:
+        raise DataFileError(
+            source, f"[{PLACE} {kind}]: contact_angle_deg is {angle!r}",
+            "It lies between 0 and 180 degrees.",
+        )  # fmt: skip
     given: dict[str, Any] = {name: table[name] for name in _WORDS[kind] if name in table}
     material = table.get("material")
     if isinstance(material, dict):

@@ -34,6 +34,7 @@ SURFACE_KEYS = {
         "lags", "autocorrelation", "quantiles",
     },
 }  # fmt: skip
+TABLES = ("surface", "substrate", "contaminants")
 # Words and switches; all else is numbers
 _WORDS = {"file", "periodic", "transparent", "unit"}
 
@@ -42,8 +43,7 @@ def load_scene(path: str | Path) -> Scene:
     """Read a scene from its TOML file.
 
     Lengths carry `_um` in their key. Heights come from a .npy file named relative to the
-    TOML file, or inline. What lies on the surface stands in tables [[contaminants]]. Other
-    tables are left to their readers.
+    TOML file, or inline. What lies on the surface stands in tables [[contaminants]].
 
     Raises
     ------
@@ -62,6 +62,10 @@ def scene_of(document: Mapping[str, Any], source: Path) -> Scene:
     DataFileError
         If a key is unknown, missing or has a wrong value.
     """
+    for key in document:
+        if key not in TABLES:
+            known = "[surface], [substrate] and [[contaminants]]"
+            raise DataFileError(source, f"unknown key {key!r}", f"A scene has {known}.")
     surface = required(document, "surface", source)
     substrate = required(document, "substrate", source)
     try:

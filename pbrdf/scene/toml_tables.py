@@ -17,6 +17,8 @@ from pbrdf.optics.published.formulas import Formula
 from pbrdf.optics.published.package import PREFIX, Entry
 
 CONSTANTS = ("n", "kappa", "diffuse_albedo")
+# Whole numbers beyond this are no measurement; a float of TOML is never larger
+LARGEST = 10**300
 _OF_A_CONSTANT = ("wavelength_um", "values", "formula", "coefficients", "range_um")
 MATERIAL_KEYS = {"material", *CONSTANTS, "wavelength_um", "name", "file", "absorbs_all"}
 
@@ -57,7 +59,8 @@ def check_numbers(
     """Refuse values of these keys that are no numbers, nor lists of numbers."""
     for key in keys:
         for value in _leaves(table.get(key, [])):
-            if isinstance(value, bool) or not isinstance(value, int | float):
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not number or (isinstance(value, int) and abs(value) > LARGEST):
                 word = str(value).lower() if isinstance(value, bool) else repr(value)
                 raise DataFileError(
                     source, f"[{place}]: {key!r} holds {word}",

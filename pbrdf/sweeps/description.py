@@ -51,7 +51,8 @@ class Sweep:
             If there can be no such scene.
         """
         document = changed(self.document, self.design.values(place))
-        return scene_of(document, self.source), arguments(document["simulate"])
+        given = arguments(document.pop("simulate"))
+        return scene_of(document, self.source), given
 
     @cached_property
     def digest(self) -> str:

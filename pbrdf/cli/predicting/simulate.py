@@ -135,8 +135,12 @@ def _told(parts: "Iterator[xr.Dataset]", lines: list[str]) -> "Iterator[xr.Datas
         yield part
 
 
+# Wavelengths that the lines on the terminal go through
+_MOST_WAVES = 8
+
+
 def budget(result: "xr.Dataset") -> Iterator[str]:
-    """Yield where the light went, one line an incidence (the first wavelength)."""
+    """Yield where the light went, one line an incidence, under azimuth and wavelength."""
     import numpy as np
 
     if "phi_i" in result.dims:
@@ -145,7 +149,12 @@ def budget(result: "xr.Dataset") -> Iterator[str]:
             yield from budget(result.isel(phi_i=position))
         return
     if "wavelength" in result.dims:
-        result = result.isel(wavelength=0)
+        waves = result.wavelength.values
+        # Of many the ends
+        for position in range(len(waves)) if len(waves) <= _MOST_WAVES else (0, -1):
+            yield f"{waves[position]:.6g} um:"
+            yield from budget(result.isel(wavelength=position))
+        return
     for position, theta_i in enumerate(result.theta_i.values):
         here = result.isel(theta_i=position)
         parts = [

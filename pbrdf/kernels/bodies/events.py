@@ -145,6 +145,9 @@ def next_surface(world, state, top, t_limit, hit):
     film, bodies = world.film, world.bodies
     x, y, z = state[top, X], state[top, Y], state[top, Z]
     k_x, k_y, k_z = state[top, KX], state[top, KY], state[top, KZ]
+    # A direction that is no number would read outside of the tables
+    if not abs(k_x) + abs(k_y) + abs(k_z) < 4.0:
+        return ASTRAY, False
     kind = OUT
     t = t_limit
     bodies_inside = 0

@@ -21,6 +21,9 @@ from pbrdf.kernels import jit
 
 # Below this a squared length is zero and its direction undefined
 TINY = 1e-300
+# Cosine of a refracted beam below which its index does not tell it any more. Such a wave
+# falls off within a wavelength of the interface, and is booked as absorbed there
+SKIMMING = 1e-7
 
 
 @jit(forceinline=True)
@@ -69,15 +72,16 @@ def interface_elements(cos_in, index, n_1, kappa_1, n_2, kappa_2):
     r_s = step / (total * total + TINY)
     r_p = bounded(r_s * (along2 - q_1 * q_2) / (bend + TINY))
     r_s = bounded(r_s)
-    refl_s = r_s.real * r_s.real + r_s.imag * r_s.imag
-    refl_p = r_p.real * r_p.real + r_p.imag * r_p.imag
+    # Rounding may leave a cut amplitude above 1 in the last digit
+    refl_s = min(r_s.real * r_s.real + r_s.imag * r_s.imag, 1.0)
+    refl_p = min(r_p.real * r_p.real + r_p.imag * r_p.imag, 1.0)
     cross = r_s * r_p.conjugate()
 
     ratio = complex(n_1, kappa_1) * complex(n_2, kappa_2) / (bend + TINY)
     length = math.sqrt(ratio.real * ratio.real + ratio.imag * ratio.imag)
     mean = math.sqrt((1.0 - refl_s) * (1.0 - refl_p)) / (length + TINY)
     further = 0.0
-    if q_2.real > 0.0:
+    if q_2.real > SKIMMING * index:
         further = math.sqrt(along2 + q_2.real * q_2.real) / index
     return (
         0.5 * (refl_s + refl_p),
