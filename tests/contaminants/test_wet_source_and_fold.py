@@ -100,7 +100,9 @@ def test_folded_runs_agree_with_others_and_state_half_the_variance():
     """Of independent seeds, over all elements: the image is an estimate of the same."""
     # Spheres, for they are laid so much faster than drops
     wet = [Spheres(radius=3.0, coverage=0.2, material=WATER, sink=0.3)]
-    plain, fold = ([folded(100 + 2 * k + f, bool(f), wet) for k in range(12)] for f in (0, 1))
+    plain, fold = (
+        [folded(100 + 2 * k + one, one, wet) for k in range(12)] for one in (False, True)
+    )
     off_axis = {"dphi": slice(1, 6), "theta_i": 0}
 
     def mean_and_variance(results):

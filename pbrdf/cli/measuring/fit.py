@@ -130,8 +130,8 @@ def command(
             alone = (n, slope_rms, material_file, height_rms, corr_length)
             if any(value is not None for value in alone):
                 msg = (
-                    "--n and --slope-rms come from the --scene, and heights have no part "
-                    "in it, got both. Leave one out."
+                    "--n, --slope-rms and heights come from the --scene, got both. Leave "
+                    "one out."
                 )
                 raise ValueError(msg)
             traced = {
