@@ -181,7 +181,7 @@ def test_each_incidence_and_wavelength_has_its_panel():
     figure = scan_figure(scan(), curves_of(0.3, 1.2))
     titles = {axis.get_title() for axis in figure.axes} - {""}
     assert len(titles) == 3 * 4
-    assert "M00 [1/sr], incidence 68.75°, 0.8 µm" in titles
+    assert "M00 [1/sr]\nincidence 68.75°, 0.8 µm" in titles
     lower = [axis for axis in figure.axes if "std. errors" in axis.get_ylabel()]
     assert len(lower) == 4
     assert all(line.get_linestyle() == "None" for line in lower[0].lines[1:])
