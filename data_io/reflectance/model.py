@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from data_io.reflectance.model_tables import checked_table
+from data_io.reflectance.model_tables import INDEX_KEYS, checked_table, index_table
 from pbrdf.errors import DataFileError
 from pbrdf.files import complete_file, read_toml
 
@@ -19,20 +19,13 @@ __all__ = ["model_text", "read_model", "write_model"]
 
 # In the file an angle carries its unit, and so is in degrees
 _ANGLES = ("shadow_omega", "shadow_tau")
-_MATERIAL_KEYS = {"n", "kappa", "name"}
 
 
 def model_text(model: "MicrofacetModel", notes: Mapping[str, Any] | None = None) -> str:
     """Return the text of the file that `write_model` writes, with the same errors."""
     import tomli_w
 
-    material = model.material
-    if callable(material.n) or callable(material.kappa):
-        msg = (
-            "material must have a constant index to be written, got a table. "
-            "Use Material(*material.index(wavelength))."
-        )
-        raise ValueError(msg)
+    index = index_table(model.material)
     if not isinstance(model.slope_distribution, str):
         msg = "slope_distribution must be a name to be written, got a table of slopes."
         raise ValueError(msg)
@@ -43,8 +36,6 @@ def model_text(model: "MicrofacetModel", notes: Mapping[str, Any] | None = None)
         for name, value in given.items()
         if value is not None
     }
-    index: dict[str, Any] = {} if material.name is None else {"name": material.name}
-    index |= {"n": float(material.n), "kappa": float(material.kappa)}
     return tomli_w.dumps({"model": table, "material": index, **(notes or {})})
 
 
@@ -100,7 +91,7 @@ def read_model(path: str | Path) -> "MicrofacetModel":
         problem = "holds a model of waves"
         raise DataFileError(source, problem, "Read it with data_io.read_wave_model.")
     table = checked_table(document, "model", set(names), {"slope_rms"}, source)
-    index = checked_table(document, "material", _MATERIAL_KEYS, {"n"}, source)
+    index = checked_table(document, "material", INDEX_KEYS, {"n"}, source)
     values = {names[key]: _from_file(names[key], value) for key, value in table.items()}
     try:
         return MicrofacetModel(Material(**index), **values)

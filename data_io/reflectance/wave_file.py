@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from data_io.reflectance.model_tables import checked_table
+from data_io.reflectance.model_tables import INDEX_KEYS, checked_table, index_table
 from pbrdf.errors import DataFileError
 from pbrdf.files import complete_file, read_toml
 
@@ -44,20 +44,12 @@ def write_wave_model(
     """
     import tomli_w
 
-    material = model.material
-    if callable(material.n) or callable(material.kappa):
-        msg = (
-            "material must have a constant index to be written, got a table. "
-            "Use Material(*material.index(wavelength))."
-        )
-        raise ValueError(msg)
+    index = index_table(model.material)
     if model.psd is not None or not isinstance(model.autocorrelation, str):
         msg = "autocorrelation must be a name to be written, got a table or a function."
         raise ValueError(msg)
     given = {key: getattr(model, name) for key, name in _KEYS.items()}
     table = {key: value for key, value in given.items() if value is not None}
-    index: dict[str, Any] = {} if material.name is None else {"name": material.name}
-    index |= {"n": float(material.n), "kappa": float(material.kappa)}
     text = tomli_w.dumps({"wave": table, "material": index, **(notes or {})})
     with complete_file(path) as stage:
         stage.write_text(text, encoding="utf-8")
@@ -88,7 +80,7 @@ def read_wave_model(path: str | Path) -> "WaveModel":
     wave = checked_table(
         document, "wave", set(_KEYS), {"height_rms_um", "corr_length_um"}, source
     )
-    index = checked_table(document, "material", {"n", "kappa", "name"}, {"n"}, source)
+    index = checked_table(document, "material", INDEX_KEYS, {"n"}, source)
     try:
         given = {_KEYS[key]: value for key, value in wave.items()}
         return WaveModel(Material(**index), **given)

@@ -69,7 +69,7 @@ def write_fit(
         curves = plane_curves(
             np.unique(plane.theta_i.values),
             zeniths,
-            analytic=model if _of_waves(model) else getattr(model, "model", model),
+            analytic=_closed_form(model),
             wavelength=plane.wavelength.values[0] if _of_waves(model) else None,
             monte_carlo=model if hasattr(model, "simulation") else None,
             phi_i=float(plane.phi_i.values[0]) - result.values.get("orientation", 0.0),
@@ -82,8 +82,7 @@ def _distinct(result: "FitResult") -> dict[str, Any]:
     """Return the analytical models that differ, by the name of their file."""
     models: dict[str, Any] = {}
     for key, model in result.models.items():
-        # Of a simulated surface the analytical model that it corrects
-        analytic = model if _of_waves(model) else getattr(model, "model", model)
+        analytic = _closed_form(model)
         if not any(_equal(analytic, other) for other in models.values()):
             models[key] = analytic
     if len(models) == 1:
@@ -97,6 +96,11 @@ def _equal(one: Any, other: Any) -> bool:
         return bool(one == other)
     pairs = [(model.beside, model.model.given) for model in (one, other)]
     return pairs[0] == pairs[1]
+
+
+def _closed_form(model: Any) -> Any:
+    """Return the model itself, of a simulated surface the analytical one it corrects."""
+    return model if _of_waves(model) else getattr(model, "model", model)
 
 
 def _of_waves(model: Any) -> bool:

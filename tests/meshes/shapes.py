@@ -102,15 +102,15 @@ class SlowMesh:
         )
         self.normal /= np.linalg.norm(self.normal, axis=1, keepdims=True)
 
-    def first(self, place, k, leaves=-1):
-        """Nearest facet seen from its front: (face, place there, margin) or None.
+    def crossings(self, place, k, leaves):
+        """Where a ray crosses the plane of each facet, and which facets it meets.
 
-        `margin` is how far inside the facet the place is, or how near another came [um].
+        `near` is how far the crossing is from the nearest edge, inside or out [um].
         """
         rate = self.normal @ k
         with np.errstate(divide="ignore", invalid="ignore"):
             time = ((self.corners[:, 0] - place) * self.normal).sum(axis=1) / rate
-        there = place + time[:, None] * k
+            there = place + time[:, None] * k
         inside = np.full(len(time), np.inf)
         for p, q in ((0, 1), (1, 2), (2, 0)):
             edge = self.corners[:, q] - self.corners[:, p]
@@ -120,6 +120,14 @@ class SlowMesh:
         own = (self.face == leaves) & (np.abs(self.move).max(axis=1) == 0.0)
         met = (time > 1e-12) & (inside >= 0.0) & ~own & np.isfinite(time)
         near = np.where((time > -1e-3) & ~own & np.isfinite(inside), np.abs(inside), np.inf)
+        return rate, time, there, near, met
+
+    def first(self, place, k, leaves=-1):
+        """Nearest facet seen from its front: (face, place there, margin) or None.
+
+        `margin` is how far inside the facet the place is, or how near another came [um].
+        """
+        rate, time, there, near, met = self.crossings(place, k, leaves)
         if not met.any():
             return None, float(near.min())
         best = np.flatnonzero(met)[np.argmin(time[met])]

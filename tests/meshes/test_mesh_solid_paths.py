@@ -62,19 +62,7 @@ class SlowSolids(SlowMesh):
 
     def next(self, place, k, leaves):
         """Nearest facet: (face, place on it, whether it is left), and the margin."""
-        rate = self.normal @ k
-        with np.errstate(divide="ignore", invalid="ignore"):
-            time = ((self.corners[:, 0] - place) * self.normal).sum(axis=1) / rate
-            there = place + time[:, None] * k
-        inside = np.full(len(time), np.inf)
-        for p, q in ((0, 1), (1, 2), (2, 0)):
-            edge = self.corners[:, q] - self.corners[:, p]
-            across = np.cross(self.normal, edge)
-            distance = (across * (there - self.corners[:, p])).sum(axis=1)
-            inside = np.minimum(inside, distance / np.linalg.norm(edge, axis=1))
-        own = (self.face == leaves) & (np.abs(self.move).max(axis=1) == 0.0)
-        met = (time > 1e-12) & (inside >= 0.0) & ~own & np.isfinite(time)
-        near = np.where((time > -1e-3) & ~own & np.isfinite(inside), np.abs(inside), np.inf)
+        rate, time, there, near, met = self.crossings(place, k, leaves)
         if not met.any():
             return None, float(near.min())
         best = np.flatnonzero(met)[np.argmin(time[met])]
