@@ -200,7 +200,7 @@ class _Exact:
         with warnings.catch_warnings():
             # Corners of the ranges may be steep; the fitted model tells of its own slope
             warnings.simplefilter("ignore", AccuracyWarning)
-            surface = self.model.with_heights(**heights).surface
+            surface = self.model.with_parameters(**heights).surface
             azimuth = np.tile(where.phi_i, len(kinds))
             rows = surface.matrices(columns, retarded=self.retarded, phi_i=azimuth)
         rows = rows.reshape(len(kinds), where.size, 16)

@@ -139,13 +139,11 @@ class WaveSurface:
 
     def updated(self, values: Mapping[str, float]) -> "WaveSurface":
         """Return the surface with these values, good in the same ranges."""
-        model = self.model
+        changes: dict[str, Any] = {k: values[k] for k in HEIGHTS if k in values}
         index: dict[str, Any] = {k: values[k] for k in ("n", "kappa") if k in values}
-        heights = {name: values[name] for name in HEIGHTS if name in values}
-        if heights:
-            model = model.with_heights(**heights)
         if index:
-            model = model.with_material(replace(model.material, **index))
+            changes["material"] = replace(self.model.material, **index)
+        model = self.model.with_parameters(**changes) if changes else self.model
         others: dict[str, Any] = {k: values[k] for k in self.beside if k in values}
         return replace(self, model=model, **others)
 

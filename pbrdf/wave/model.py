@@ -308,21 +308,13 @@ class WaveModel:
         """Names of the forms that an estimate of the error compares."""
         return self.method, "auto", "order-weighted", "kirchhoff"
 
-    def with_method(self, method: str) -> "WaveModel":
-        """Return the same surface by another form."""
-        return WaveModel(**{**self.given, "method": method})
-
-    def with_heights(
-        self, height_rms: float | None = None, corr_length: float | None = None
-    ) -> "WaveModel":
-        """Return the same kind of surface with other heights, None as they are. [um]"""
-        given = {"height_rms": height_rms, "corr_length": corr_length}
-        changes = {name: value for name, value in given.items() if value is not None}
+    def with_parameters(self, **changes: Any) -> "WaveModel":
+        """Return the model with some arguments replaced."""
         return WaveModel(**{**self.given, **changes})
 
-    def with_material(self, material: Material) -> "WaveModel":
-        """Return the same surface of something else."""
-        return WaveModel(**{**self.given, "material": material})
+    def with_method(self, method: str) -> "WaveModel":
+        """Return the same surface by another form."""
+        return self.with_parameters(method=method)
 
     @property
     def given(self) -> dict[str, Any]:

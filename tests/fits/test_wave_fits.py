@@ -71,7 +71,10 @@ def test_a_polished_surface_read_by_the_book():
     ("free", "start"),
     [
         (("height_rms", "corr_length"), START),
-        (("height_rms", "corr_length", "n"), START.with_material(Material(1.42))),
+        (
+            ("height_rms", "corr_length", "n"),
+            START.with_parameters(material=Material(1.42)),
+        ),
     ],
 )
 def test_height_and_length_of_two_wavelengths(free, start):
@@ -132,7 +135,7 @@ def test_what_a_fit_of_waves_says():
     assert any("1 readings lie in the specular beam" in note for note in result.warnings)
     assert result.values["height_rms"] == pytest.approx(0.13, abs=5 * 0.13 * 0.01)
     # Beyond its reach the height stops at the bound and says so
-    near = WaveSurface(TRUTH.with_heights(height_rms=0.08), reach=1.2)
+    near = WaveSurface(TRUTH.with_parameters(height_rms=0.08), reach=1.2)
     stopped = fitting.fit(beam, near, ("height_rms",))
     assert any("height_rms stands at its bound" in note for note in stopped.warnings)
     with pytest.raises(ValueError, match="WaveSurface a wider index_range"):
