@@ -183,11 +183,12 @@ RUNS = {
     ),
     "unpolarized": ("rough", FINE | {"angles": 40, "stokes": "unpolarized"}),
     "azimuths": ("map", WIDE | {"angles": 8, "phi_i": [0.0, 1.0, 2.0, 3.0, 4.0]}),
+    # Of one worker: whether two draw their surfaces at the same moment is chance
     "large surface": (
         "rough",
         {
-            "n_theta": 9, "n_dphi": 12, "n_rays": 100, "realizations": 8, "workers": 2,
-            "variance_reduction": False, "shape": 2500,
+            "n_theta": 9, "n_dphi": 12, "n_rays": 100, "realizations": 3, "workers": 1,
+            "variance_reduction": False, "shape": 3200,
         },
     ),
     "observe": ("observe", {"angles": 400, "waves": 100, "n_rays": 32, "workers": 1}),
