@@ -1,6 +1,7 @@
 """Further bounces brought into balance with single bounces that do not come from rays."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 
@@ -36,6 +37,13 @@ class Balance:
         self._cross_total = np.zeros(shape[:2] + shape[3:5])
         # Single bounces for a unit of X, all bins together (angles, wavelengths)
         self._taken = np.zeros(shape[:2])
+
+    def of_waves(self, own: tuple[slice, slice]) -> "Balance":
+        """Return that of the wavelengths at a place of arrays (angles, wavelengths)."""
+        part = copy(self)
+        for name in ("_cross", "_cross_total", "_taken"):
+            setattr(part, name, getattr(self, name)[own])
+        return part
 
     def add(self, angle: int, tally: Tally, n_rays: int, mean: np.ndarray) -> None:
         """Add incident direction `angle` of a sample, before it goes into the mean flux."""

@@ -1,6 +1,7 @@
 """Mean and standard error over the tallies of many samples."""
 
 from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -79,6 +80,20 @@ class Moments:
             add_sample(_by_bin(tally.flux[a]), self._matrix, running)
         self._albedo.append(albedo)
         self._energy.append(tally.energy / counted[:, None, None])
+
+    def of_waves(self, first: int, last: int, plan: Plan) -> "Moments":
+        """Return those of some wavelengths, of the plan of these alone.
+
+        Both look at the same numbers: finish only one of them.
+        """
+        part = copy(self)
+        part.plan, own = plan, np.s_[:, first:last]
+        part.balance = self.balance and self.balance.of_waves(own)
+        for name in ("_mean", "_scatter", "_scatter_total"):
+            setattr(part, name, getattr(self, name)[own])
+        part._albedo = [one[own] for one in self._albedo]
+        part._energy = [one[own] for one in self._energy]
+        return part
 
     def _check(self, counted: np.ndarray) -> None:
         """Raise if all rays of a direction left a finite map sideways.

@@ -1,19 +1,25 @@
-"""Simulations part by part, for results that do not fit into memory."""
+"""Simulations part by part, and several from one trace."""
 
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
 from pbrdf.scene.scene import Scene
-from pbrdf.simulation.memory import OF_SIZE, asked_size, directions_at_once
-from pbrdf.simulation.run import prepared, simulate, traced
+from pbrdf.simulation.memory import OF_SIZE, asked_size, check_run, directions_at_once
+from pbrdf.simulation.plan import Plan
+from pbrdf.simulation.results import judged_before, labelled
+from pbrdf.simulation.run import planned, prepared, simulate, traced, wants_looks
+from pbrdf.simulation.samples import Ready, trace_samples
+from pbrdf.simulation.single_bounce import SingleBounce, can_do_without
+from pbrdf.surface import Surface
 from pbrdf.tracer import arguments
 
-__all__ = ["simulate_parts"]
+__all__ = ["simulate_parts", "simulate_together"]
 
 
 def simulate_parts(
@@ -82,3 +88,126 @@ def _told(
     if progress is None:
         return None
     return lambda done, total: progress(number * total + done, parts * total)
+
+
+def simulate_together(
+    surface: Surface,
+    theta_i: npt.ArrayLike,
+    lights: Sequence[tuple[Any, npt.ArrayLike | None]],
+    **options: Any,
+) -> list[xr.Dataset]:
+    """Simulate a clean surface of several materials, or at several wavelengths, at once.
+
+    One trace serves all. Each result is that of `simulate` bit for bit, or where that sums
+    single bounces by bin (four wavelengths or more, skip "spectra") within the 1e-8 of M00
+    that it keeps to.
+
+    Parameters
+    ----------
+    surface, theta_i
+        As of `Scene` and `simulate`.
+    lights : sequence of (substrate, wavelength)
+        Of each result: as of `Scene` and `simulate`.
+    **options
+        What `simulate` takes besides, but target_rel_error, which each run reaches with a
+        number of samples of its own.
+
+    Returns
+    -------
+    list of Dataset
+
+    Raises
+    ------
+    ValueError
+        As `simulate`, or if light goes through the surface, or only some of the materials
+        have a diffuse base, or only some of the lights four wavelengths.
+
+    Examples
+    --------
+    >>> from pbrdf import HeightMap, Material
+    >>> flat = HeightMap.flat(size=(1.0, 1.0))
+    >>> lights = [(Material(1.5), None), (Material(2.0), None)]
+    >>> results = simulate_together(flat, 0.0, lights, n_rays=320)
+    >>> [round(one.albedo.values.sum(), 4) for one in results]
+    [np.float64(0.04), np.float64(0.1111)]
+    """
+    if options.get("target_rel_error") is not None:
+        msg = (
+            f"target_rel_error must be left out here, got {options['target_rel_error']}: "
+            "each run reaches it by itself. Give n_rays and realizations."
+        )
+        raise ValueError(msg)
+    # One seed for all, drawn if none is given
+    seed = int(arguments.seed_sequence(options.get("seed", 0)).entropy)  # type: ignore[arg-type]
+    each = []
+    for substrate, wavelength in lights:
+        asked = options | {"seed": seed, "wavelength": wavelength}
+        bound = inspect.signature(simulate).bind(
+            Scene(surface, substrate), theta_i, **asked
+        )
+        bound.apply_defaults()
+        each.append(planned(whole=False, **bound.arguments))
+    _check_all(each)
+    plans, first = _joined(each), each[0]
+    single = None
+    if wants_looks(first.run, first.given) and can_do_without(surface, first.plans[0]):
+        single = [SingleBounce.of(surface, plan) for plan in plans]
+    judged = [judged_before(one) for one in each]
+    moments, done = trace_samples(first.run, plans, single)
+    found, at = [], 0
+    for one, notes in zip(each, judged, strict=True):
+        end = at + len(one.plans[0].n)
+        own = [
+            all_waves.of_waves(at, end, plan)
+            for all_waves, plan in zip(moments, one.plans, strict=True)
+        ]
+        found.append(labelled(replace(one, single=single), own, done, notes))
+        at = end
+    return found
+
+
+def _check_all(each: Sequence[Ready]) -> None:
+    """Refuse runs that do not fit together into the memory that is free."""
+    given = each[0].given
+    size = asked_size(given["theta_i"], **{name: given[name] for name in OF_SIZE})
+    check_run(
+        each[0].run.scene, replace(size, waves=sum(len(one.run.n) for one in each)),
+        n_rays=given["n_rays"], realizations=given["realizations"], planned=False,
+        workers=given["workers"], looks=given["variance_reduction"],
+    )  # fmt: skip
+
+
+def _joined(each: Sequence[Ready]) -> list[Plan]:
+    """Put the constants of all runs into one plan each azimuth, as if of more wavelengths.
+
+    Raises
+    ------
+    ValueError
+        If a run asks for other paths.
+    """
+    for number, one in enumerate(each):
+        plan, wanted = one.plans[0], each[0].plans[0]
+        same = (
+            plan.media is None
+            and plan.base.shape[1] == wanted.base.shape[1]
+            and plan.n.shape[1] == wanted.n.shape[1]
+            and (plan.spectrum is None) == (wanted.spectrum is None)
+        )
+        if not same:
+            msg = (
+                "lights must be of opaque materials, all with a diffuse base or none, and "
+                f"all of four wavelengths or more or none, got another at index {number}. "
+                "Simulate it alone."
+            )
+            raise ValueError(msg)
+    joined = []
+    for plans in zip(*(one.plans for one in each), strict=True):
+        constants = {
+            name: np.concatenate([getattr(plan, name) for plan in plans])
+            for name in ("n", "kappa", "base")
+        }
+        # By bin only what each would sum by bin alone
+        skips = plans[0].skips
+        skips = skips if plans[0].spectrum else skips - {"spectra"}
+        joined.append(replace(plans[0], skips=skips, **constants))
+    return [joined[0], *(joined[0].at(plan.phi_i) for plan in joined[1:])]

@@ -1,13 +1,17 @@
-"""Result datasets: labelled axes, units from one table, the scene as attributes."""
+"""Result datasets: labelled axes, units from one table, attributes that tell all."""
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from pbrdf._version import __version__
+from pbrdf.contaminants.arguments import material_of
 from pbrdf.conventions import BOUNCES, RESULT_VARIABLES, STOKES, detector_bins
+from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.paths.shading import (
     ABSORBED,
     LEAKED,
@@ -26,6 +30,22 @@ from pbrdf.kernels.paths.shading import (
 from pbrdf.scene.scene import Scene
 from pbrdf.scene.write import scene_text
 from pbrdf.simulation.moments import Moments
+from pbrdf.simulation.plan import Plan
+from pbrdf.simulation.samples import Ready
+from pbrdf.simulation.single_bounce import SingleBounce
+from pbrdf.simulation.skips import explanation, mesh_explanation
+from pbrdf.simulation.waves import join_waves
+from pbrdf.surface import HeightMap, MeshSurface
+from pbrdf.tracer.field import Field
+from pbrdf.tracer.media import opaque_drop_notes
+from pbrdf.tracer.thin_films import thin_absorber_warnings
+from pbrdf.validity import (
+    Judgement,
+    attach,
+    judge_contaminants,
+    lost_light_warnings,
+    lost_ray_warnings,
+)
 
 
 def to_dataset(
@@ -114,3 +134,118 @@ def _estimates(moments: Moments) -> dict[str, np.ndarray]:
         "left_sideways": energy[..., SIDEWAYS],
         "side_exits": moments.counts[:, N_SIDE] / (plan.n_rays * moments.samples),
     }
+
+
+def judged_before(ready: Ready) -> Judgement:
+    """Judge a run before it is traced, and warn of what that says."""
+    run = ready.run
+    # What rays do not see at these wavelengths is no fault where waves do the first bounce
+    waves = None if ready.given["wave"] else run.waves
+    judged = run.judged(ready.plans[0].theta_i, waves)
+    early = [*judged.notes, *opaque_drop_notes(run.scene.contaminants, run.waves)]
+    _warn(early)
+    return replace(judged, notes=tuple(early))
+
+
+def labelled(
+    ready: Ready, moments: list[Moments], done: int, judged: Judgement
+) -> xr.Dataset:
+    """Label the moments of `done` samples of a run."""
+    run, plan, single, given = ready.run, ready.plans[0], ready.single, ready.given
+    scene, wave = run.scene, given["wave"]
+    laid = _judge_contaminants(scene, moments[0], run.waves)
+    late = [*moments[0].notes, *laid.notes, *_missing_light(moments)]
+    late += _thin_films(scene, moments[0], run.waves)
+    _warn(late)
+    # Told in any case, but no surprise to one who set the limit
+    cut = _cut_light(moments)
+    _warn(() if given["max_bounces"] is not None else cut)
+    phi_i = given["phi_i"]
+    result = to_dataset(
+        moments,
+        scene,
+        several=ready.several,
+        wavelength=run.waves,
+        attrs=run.attributes(done)
+        | {
+            "max_bounces": plan.max_bounces,
+            "phi_i": phi_i if isinstance(phi_i, str) else np.asarray(phi_i, float).tolist(),
+            "source_half_angle": plan.half_angle,
+            "folded": plan.fold,
+            "intersector": _intersector(scene, plan.skips),
+            "plan": ready.chosen,
+            "variance_reduction": "none" if single is None else "single bounces",
+            "explanation": _explain(scene, plan, single) if given["explain"] else [],
+            "contaminants": [str(dict(report)) for report in moments[0].reports],
+            "warnings": [*judged.notes, *late, *judged.remarks, *cut],
+        },
+    )  # fmt: skip
+    result = attach(result, {**judged.numbers, **laid.numbers})
+    return result if wave is None else join_waves(result, scene, wave)
+
+
+def _warn(notes: Iterable[str]) -> None:
+    """Warn whoever called `simulate`."""
+    for note in notes:
+        warnings.warn(note, AccuracyWarning, stacklevel=5)
+
+
+def _judge_contaminants(
+    scene: Scene, moments: Moments, waves: np.ndarray | None
+) -> Judgement:
+    """Judge what lies on the surface, known only after laying it."""
+    if waves is None or not scene.contaminants:
+        return Judgement()
+    coverings = [material_of(one.material) for one in scene.contaminants]
+    return judge_contaminants(moments.reports, waves, coverings, scene.materials)
+
+
+def _missing_light(moments: Sequence[Moments]) -> list[str]:
+    """Warnings of rays lost, and of light that leaked or left sideways."""
+    first = moments[0]
+    lost = sum(int(one.counts[:, N_LEAKED].sum()) for one in moments)
+    rays = first.plan.n_rays * first.samples * len(first.plan.theta_i) * len(moments)
+    energy = np.max([one.energy() for one in moments], axis=0)
+    aside = np.max([one.counts[:, N_SIDE] for one in moments], axis=0)
+    shares = {
+        "leaked": energy[..., LEAKED],
+        "left_sideways": energy[..., SIDEWAYS],
+        "side_exits": aside / (first.plan.n_rays * first.samples),
+    }
+    plan = first.plan
+    found = lost_ray_warnings(lost, rays)
+    if found:
+        del shares["leaked"]  # said already
+    return found + lost_light_warnings(shares, plan.theta_i, plan.max_bounces)
+
+
+def _cut_light(moments: Sequence[Moments]) -> list[str]:
+    """Say how much light was cut off."""
+    plan = moments[0].plan
+    share = np.max([one.energy() for one in moments], axis=0)[..., TRUNCATED]
+    return lost_light_warnings({"truncated": share}, plan.theta_i, plan.max_bounces)
+
+
+def _thin_films(scene: Scene, moments: Moments, waves: np.ndarray | None) -> list[str]:
+    """Warnings of films whose waves overlap; their thickness is known after laying them."""
+    coverings = [material_of(one.material) for one in scene.contaminants]
+    angles = moments.plan.theta_i
+    return thin_absorber_warnings(
+        moments.reports, coverings, scene.materials, angles, waves
+    )
+
+
+def _explain(scene: Scene, plan: Plan, single: Sequence[SingleBounce] | None) -> list[str]:
+    surface = scene.surface
+    if isinstance(surface, MeshSurface):
+        return mesh_explanation(plan, faces=len(surface.faces), kind=surface.kind)
+    sample = surface if isinstance(surface, HeightMap) else surface.sample(0)
+    steepest = float(Field.of(sample).terrain.steepest)
+    lines = explanation(plan, periodic=sample.periodic, steepest=steepest)
+    return lines + (single[0].explanation() if single else [])
+
+
+def _intersector(scene: Scene, allowed: frozenset[str]) -> str:
+    if isinstance(scene.surface, MeshSurface):
+        return "embree, refined in float64"
+    return "height-field walk" if "walk" in allowed else "embree"

@@ -1,9 +1,7 @@
 """Monte Carlo prediction of the Mueller BRDF of a scene: section 3 of the paper."""
 
-import copy
-import warnings
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -13,37 +11,23 @@ import xarray as xr
 
 import pbrdf.accessor  # noqa: F401  (registers ds.pbrdf)
 from pbrdf.contaminants import Film
-from pbrdf.contaminants.arguments import material_of
-from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.bodies.world import Media
-from pbrdf.kernels.paths.shading import LEAKED, N_LEAKED, N_SIDE, SIDEWAYS, TRUNCATED
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.memory import OF_SIZE, asked_size, check_run
-from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.pilot import choose
 from pbrdf.simulation.plan import Plan
-from pbrdf.simulation.results import to_dataset
-from pbrdf.simulation.samples import trace_samples
-from pbrdf.simulation.single_bounce import SingleBounce, without_rays
-from pbrdf.simulation.skips import chosen_skips, explanation, mesh_explanation
-from pbrdf.simulation.waves import check_waves, join_waves
-from pbrdf.surface import HeightMap, MeshSurface
+from pbrdf.simulation.results import judged_before, labelled
+from pbrdf.simulation.samples import Ready, trace_samples
+from pbrdf.simulation.single_bounce import without_rays
+from pbrdf.simulation.skips import chosen_skips
+from pbrdf.simulation.waves import check_waves
+from pbrdf.surface import MeshSurface
 from pbrdf.tracer import arguments
 from pbrdf.tracer.asked import Run
-from pbrdf.tracer.field import Field
 from pbrdf.tracer.media import (
     clear_materials,
     covering_materials,
     media_of,
-    opaque_drop_notes,
-)
-from pbrdf.tracer.thin_films import thin_absorber_warnings
-from pbrdf.validity import (
-    Judgement,
-    attach,
-    judge_contaminants,
-    lost_light_warnings,
-    lost_ray_warnings,
 )
 
 # Where paths are cut: on a clean surface, and where transparent bodies may catch light
@@ -182,35 +166,26 @@ def simulate(  # noqa: PLR0913  (the public signature)
     return traced(prepared(**locals()))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Ready:
-    """A run that is checked and planned, as its arguments say.
-
-    `chosen` says how a plan was chosen; `given` holds the arguments of `simulate`.
-    """
-
-    run: Run
-    plans: list[Plan]
-    several: bool
-    single: list[SingleBounce] | None
-    chosen: list[str]
-    given: dict[str, Any]
-
-    def part(self, first: int, last: int) -> "Ready":
-        """Return the run of some of the directions, with the rays they have among all."""
-        single = self.single and [one.part(first, last) for one in self.single]
-        # Streams are spawned anew, from the same root
-        run = replace(self.run, root=copy.deepcopy(self.run.root))
-        plans = [plan.part(first, last) for plan in self.plans]
-        return replace(self, run=run, plans=plans, single=single)
-
-
 # Arguments that are on or off
 SWITCHES = ("variance_reduction", "explain")
 
 
 def prepared(*, whole: bool = True, **given: Any) -> Ready:
     """Check and plan a run, by the arguments of `simulate`; `whole` if all is kept."""
+    ready = planned(whole=whole, **given)
+    scene, plans = ready.run.scene, ready.plans
+    return replace(
+        ready, single=without_rays(scene, plans, wanted=wants_looks(ready.run, given))
+    )
+
+
+def wants_looks(run: Run, given: Mapping[str, Any]) -> bool:
+    """Whether single bounces need not come from rays, as far as the arguments say."""
+    return given["variance_reduction"] and not run.batched and given["wave"] is None
+
+
+def planned(*, whole: bool = True, **given: Any) -> Ready:
+    """Do the same without the integral over single bounces, which takes time."""
     scene, theta_i, wave = given["scene"], given["theta_i"], given["wave"]
     n_rays, realizations = given["n_rays"], given["realizations"]
     target = given["target_rel_error"]
@@ -234,59 +209,17 @@ def prepared(*, whole: bool = True, **given: Any) -> Ready:
         target_rel_error=target, progress=given["progress"], **common,
     )  # fmt: skip
     plans, several = _plans(run, theta_i, given["phi_i"], **geometry)
-    single = without_rays(scene, plans, wanted=light and not run.batched and wave is None)
     if wave is not None:
         check_waves(scene, wave, run.waves, given["stokes"], plans[0].half_angle)
     return Ready(
-        run=run, plans=plans, several=several, single=single, chosen=chosen, given=given
+        run=run, plans=plans, several=several, single=None, chosen=chosen, given=given
     )
 
 
 def traced(ready: Ready) -> xr.Dataset:
     """Trace the samples of a run, and label what they gave."""
-    run, plans, single, given = ready.run, ready.plans, ready.single, ready.given
-    scene, wave, plan = run.scene, given["wave"], plans[0]
-    # What rays do not see at these wavelengths is no fault where waves do the first bounce
-    judged = run.judged(plan.theta_i, None if wave else run.waves)
-    early = [*judged.notes, *opaque_drop_notes(scene.contaminants, run.waves)]
-    _warn(early)
-    moments, done = trace_samples(run, plans, single)
-
-    laid = _judge_contaminants(scene, moments[0], run.waves)
-    late = [*moments[0].notes, *laid.notes, *_missing_light(moments)]
-    late += _thin_films(scene, moments[0], run.waves)
-    _warn(late)
-    # Told in any case, but no surprise to one who set the limit
-    cut = _cut_light(moments)
-    _warn(() if given["max_bounces"] is not None else cut)
-    phi_i = given["phi_i"]
-    result = to_dataset(
-        moments,
-        scene,
-        several=ready.several,
-        wavelength=run.waves,
-        attrs=run.attributes(done)
-        | {
-            "max_bounces": plan.max_bounces,
-            "phi_i": phi_i if isinstance(phi_i, str) else np.asarray(phi_i, float).tolist(),
-            "source_half_angle": plan.half_angle,
-            "folded": plan.fold,
-            "intersector": _intersector(scene, plan.skips),
-            "plan": ready.chosen,
-            "variance_reduction": "none" if single is None else "single bounces",
-            "explanation": _explain(scene, plan, single) if given["explain"] else [],
-            "contaminants": [str(dict(report)) for report in moments[0].reports],
-            "warnings": [*early, *late, *judged.remarks, *cut],
-        },
-    )  # fmt: skip
-    result = attach(result, {**judged.numbers, **laid.numbers})
-    return result if wave is None else join_waves(result, scene, wave)
-
-
-def _warn(notes: Iterable[str]) -> None:
-    """Warn whoever called `simulate`."""
-    for note in notes:
-        warnings.warn(note, AccuracyWarning, stacklevel=4)
+    early = judged_before(ready)
+    return labelled(ready, *trace_samples(ready.run, ready.plans, ready.single), early)
 
 
 def _plans(  # noqa: PLR0913  (arguments of `simulate`)
@@ -360,64 +293,3 @@ def _counts(
         sentences = choice.sentences
     rays = N_RAYS if n_rays is None else n_rays
     return rays, 1 if realizations is None else realizations, sentences
-
-
-def _judge_contaminants(
-    scene: Scene, moments: Moments, waves: np.ndarray | None
-) -> Judgement:
-    """Judge what lies on the surface, known only after laying it."""
-    if waves is None or not scene.contaminants:
-        return Judgement()
-    coverings = [material_of(one.material) for one in scene.contaminants]
-    return judge_contaminants(moments.reports, waves, coverings, scene.materials)
-
-
-def _missing_light(moments: Sequence[Moments]) -> list[str]:
-    """Warnings of rays lost, and of light that leaked or left sideways."""
-    first = moments[0]
-    lost = sum(int(one.counts[:, N_LEAKED].sum()) for one in moments)
-    rays = first.plan.n_rays * first.samples * len(first.plan.theta_i) * len(moments)
-    energy = np.max([one.energy() for one in moments], axis=0)
-    aside = np.max([one.counts[:, N_SIDE] for one in moments], axis=0)
-    shares = {
-        "leaked": energy[..., LEAKED],
-        "left_sideways": energy[..., SIDEWAYS],
-        "side_exits": aside / (first.plan.n_rays * first.samples),
-    }
-    plan = first.plan
-    found = lost_ray_warnings(lost, rays)
-    if found:
-        del shares["leaked"]  # said already
-    return found + lost_light_warnings(shares, plan.theta_i, plan.max_bounces)
-
-
-def _cut_light(moments: Sequence[Moments]) -> list[str]:
-    """Say how much light was cut off."""
-    plan = moments[0].plan
-    share = np.max([one.energy() for one in moments], axis=0)[..., TRUNCATED]
-    return lost_light_warnings({"truncated": share}, plan.theta_i, plan.max_bounces)
-
-
-def _thin_films(scene: Scene, moments: Moments, waves: np.ndarray | None) -> list[str]:
-    """Warnings of films whose waves overlap; their thickness is known after laying them."""
-    coverings = [material_of(one.material) for one in scene.contaminants]
-    angles = moments.plan.theta_i
-    return thin_absorber_warnings(
-        moments.reports, coverings, scene.materials, angles, waves
-    )
-
-
-def _explain(scene: Scene, plan: Plan, single: Sequence[SingleBounce] | None) -> list[str]:
-    surface = scene.surface
-    if isinstance(surface, MeshSurface):
-        return mesh_explanation(plan, faces=len(surface.faces), kind=surface.kind)
-    sample = surface if isinstance(surface, HeightMap) else surface.sample(0)
-    steepest = float(Field.of(sample).terrain.steepest)
-    lines = explanation(plan, periodic=sample.periodic, steepest=steepest)
-    return lines + (single[0].explanation() if single else [])
-
-
-def _intersector(scene: Scene, allowed: frozenset[str]) -> str:
-    if isinstance(scene.surface, MeshSurface):
-        return "embree, refined in float64"
-    return "height-field walk" if "walk" in allowed else "embree"

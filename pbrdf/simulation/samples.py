@@ -1,7 +1,9 @@
 """Samples of a run: realisations of a scene, or batches of rays over one, until enough."""
 
+import copy
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -20,6 +22,29 @@ from pbrdf.tracer.field import Field
 from pbrdf.tracer.schedule import gather
 from pbrdf.tracer.wet_field import WetField
 from pbrdf.tracer.wet_mesh import WetMesh
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ready:
+    """A run that is checked and planned, as its arguments say.
+
+    `chosen` says how a plan was chosen; `given` holds the arguments of `simulate`.
+    """
+
+    run: Run
+    plans: list[Plan]
+    several: bool
+    single: list[SingleBounce] | None
+    chosen: list[str]
+    given: dict[str, Any]
+
+    def part(self, first: int, last: int) -> "Ready":
+        """Return the run of some of the directions, with the rays they have among all."""
+        single = self.single and [one.part(first, last) for one in self.single]
+        # Streams are spawned anew, from the same root
+        run = replace(self.run, root=copy.deepcopy(self.run.root))
+        plans = [plan.part(first, last) for plan in self.plans]
+        return replace(self, run=run, plans=plans, single=single)
 
 
 def trace_samples(

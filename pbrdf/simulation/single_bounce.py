@@ -10,6 +10,7 @@ of further bounces go through, by facets of fitting slopes put at random places.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypeGuard
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from pbrdf.kernels.terrain.heightfield import Terrain
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.plan import Plan, Tally
 from pbrdf.simulation.spectra import WORTHWHILE
-from pbrdf.surface.gaussian import GaussianSurface
+from pbrdf.surface import GaussianSurface, Surface
 
 # Places with a facet for each azimuth's cells, to each ray of a realisation
 PLACES_PER_RAY = 0.02
@@ -52,18 +53,22 @@ def without_rays(
     scene: Scene, plans: Sequence[Plan], *, wanted: bool
 ) -> "list[SingleBounce] | None":
     """Single bounces of plans over a scene, where wanted and to be had without rays."""
-    surface, plan = scene.surface, plans[0]
-    if (
-        not wanted
-        or not isinstance(surface, GaussianSurface)
-        or plan.media is not None
-        or plan.base.shape[1] > 0
-        or len(plan.n) >= WORTHWHILE
-        or plan.half_angle > 0.0
-        or min(surface.facet_slope_rms) < NARROWEST
-    ):
+    surface = scene.surface
+    if not wanted or not can_do_without(surface, plans[0]):
         return None
     return [SingleBounce.of(surface, one) for one in plans]
+
+
+def can_do_without(surface: Surface, plan: Plan) -> TypeGuard[GaussianSurface]:
+    """Whether single bounces of a plan over a surface are to be had without rays."""
+    return (
+        isinstance(surface, GaussianSurface)
+        and plan.media is None
+        and plan.base.shape[1] == 0
+        and len(plan.n) < WORTHWHILE
+        and plan.half_angle == 0.0
+        and min(surface.facet_slope_rms) >= NARROWEST
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

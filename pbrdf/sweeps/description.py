@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +22,8 @@ __all__ = ["Sweep", "load_sweep", "sweep_of"]
 
 _TABLES = ("scene", "vary", "simulate", "design", "surface", "substrate", "contaminants")
 _RANGE = {"from", "to", "scale"}
+# How points are laid out and computed together; another number is another store
+_LAYOUT = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,10 +57,38 @@ class Sweep:
         return scene_of(document, self.source), given
 
     @cached_property
+    def joint(self) -> tuple[Axis, ...]:
+        """Axes whose values one trace serves: of the substrate of a clean surface.
+
+        By point also the wavelength. Towards a target error each point takes samples of its
+        own number, and has its own trace.
+        """
+        run = self.document["simulate"]
+        targets = any(axis.path[-1] == "target_rel_error" for axis in self.design.axes)
+        if self.document.get("contaminants") or "target_rel_error" in run or targets:
+            return ()
+        return tuple(
+            axis
+            for axis in self.design.ordered
+            if axis.path[0] == "substrate" or axis.path == ("simulate", "wavelength_um")
+        )
+
+    def alike(self, places: Iterable[Mapping[str, int]]) -> list[list[int]]:
+        """Put points together that one trace serves: their numbers among those given."""
+        apart = [axis.path for axis in self.design.axes if axis not in self.joint]
+        found: dict[str, list[int]] = {}
+        for number, place in enumerate(places):
+            values = self.design.values(place)
+            key = [values[path] for path in apart] if self.joint else number
+            found.setdefault(repr(key), []).append(number)
+        return list(found.values())
+
+    @cached_property
     def digest(self) -> str:
         """What tells this sweep from every other: scene, files, values, run and version."""
         kept = {
             "version": __version__,
+            "layout": _LAYOUT,
             "document": self.document,
             "files": sorted(self._files()),
             "kind": self.design.kind,

@@ -107,7 +107,8 @@ class Design:
     def shape(self) -> dict[str, int]:
         """Dimensions of the points and their sizes; one dimension `point` but for a grid.
 
-        Axes of the surface come first, so that points next to each other share surfaces.
+        Axes of the surface come first and those of the substrate last: points next to each
+        other differ in their material alone, and share a trace.
         """
         if self.kind == "grid":
             return {axis.name: len(axis.values) for axis in self.ordered}
@@ -115,8 +116,9 @@ class Design:
 
     @cached_property
     def ordered(self) -> tuple[Axis, ...]:
-        """Axes, those of the surface first."""
-        return tuple(sorted(self.axes, key=lambda axis: axis.path[0] != "surface"))
+        """Axes, those of the surface first, of the substrate last."""
+        places = {"surface": 0, "substrate": 2}
+        return tuple(sorted(self.axes, key=lambda axis: places.get(str(axis.path[0]), 1)))
 
     @cached_property
     def _columns(self) -> dict[str, list[Any]]:

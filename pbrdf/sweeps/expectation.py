@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pbrdf.errors import AccuracyWarning
-from pbrdf.simulation.run import simulate
 from pbrdf.sweeps.description import Sweep
 from pbrdf.sweeps.layout import Layout
+from pbrdf.sweeps.tasks import simulated
 from pbrdf.tracer.arguments import worker_count
 
 __all__ = ["Forecast", "forecast"]
@@ -30,7 +30,8 @@ class Forecast:
     task_bytes : int
         Memory that the results of a task take, whatever the number of tasks.
     seconds : float
-        Expected work on one core, from the first and the last point. [s]
+        Expected work on one core, from the first and the last point and those that share
+        their traces. [s]
     cores : int
         Cores at hand.
     """
@@ -65,9 +66,10 @@ def forecast(sweep: Sweep, *, workers: int | None = None) -> Forecast:
     towards a target error both are computed in full.
     """
     layout = Layout.of(sweep)
-    last = {name: size - 1 for name, size in layout.sizes.items()}
-    ends = [dict.fromkeys(layout.sizes, 0), last]
-    each = [_timed(sweep, place) for place in ends]
+    each = [
+        _timed(sweep, [point for _, point in layout.points(group)], end)
+        for group, end in ((0, 0), (layout.n_groups - 1, -1))
+    ]
     return Forecast(
         points=layout.n_points,
         groups=layout.n_groups,
@@ -78,21 +80,28 @@ def forecast(sweep: Sweep, *, workers: int | None = None) -> Forecast:
     )
 
 
-def _timed(sweep: Sweep, place: dict[str, int]) -> float:
-    """Return the time of a point on one core. [s]"""
-    scene, given = sweep.at(place)
+def _timed(sweep: Sweep, points: list[dict[str, int]], end: int) -> float:
+    """Return the time of the first or last point of a group on one core. [s]
+
+    It is the part of it in that of all that share its trace.
+    """
+    places = [points[k] for k in sweep.alike(points)[end]]
+    _, given = sweep.at(places[end])
     drawn = int(given.get("realizations", 0))
-    part = given
+    instead = {}
     if "target_rel_error" not in given:
-        part = given | {"realizations": min(drawn, max(_LEAST, drawn // _PART))}
+        instead["realizations"] = min(drawn, max(_LEAST, drawn // _PART))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AccuracyWarning)
         started = time.perf_counter()
-        result = simulate(scene, **part, workers=1)
-        took = time.perf_counter() - started
-    if part is given or result.attrs["stderr_excludes_surface"]:
+        results = list(simulated(sweep, places, 1, **instead))
+        took = (time.perf_counter() - started) / len(places)
+    result = results[end]
+    if isinstance(result, Exception):
+        raise result
+    if not instead or result.attrs["stderr_excludes_surface"]:
         return took
-    return took * drawn / part["realizations"]
+    return took * drawn / instead["realizations"]
 
 
 def _duration(seconds: float) -> str:

@@ -30,6 +30,8 @@ _NUMBERS = {
 # A group of points is written at once: at most so many bytes, and work of so many seconds
 _MOST_BYTES = 64e6
 _MOST_SECONDS = 4.0
+# What one trace serves is computed together up to this
+_JOINT_BYTES = 200e6
 # Rough times of a ray, of a node of a surface, and of a run whatever its size [s]
 _RAY, _NODE, _RUN = 1e-6, 2e-7, 5e-3
 
@@ -103,9 +105,8 @@ class Layout:
             for name, c in trial[[*trial.coords, *shared]].variables.items()
         }
         coords |= _axes(sweep)
-        most = min(_MOST_BYTES / _bytes(variables), _MOST_SECONDS / seconds(scene, given))
+        chunk = _chunk(sweep, _bytes(variables), seconds(scene, given))
         sizes = sweep.design.shape
-        chunk = _chunk(tuple(sizes.values()), max(int(most), 1))
         return cls(sizes=sizes, chunk=chunk, variables=variables, coords=coords)
 
     @cached_property
@@ -244,10 +245,24 @@ def _bytes(variables: Mapping[str, Variable]) -> int:
     )
 
 
-def _chunk(sizes: tuple[int, ...], most: int) -> tuple[int, ...]:
-    """Points of a group along each dimension: the last ones whole, as far as they go."""
+def _chunk(sweep: Sweep, size: int, trace: float) -> tuple[int, ...]:
+    """Points of a group along each dimension: the last ones whole, as far as they go.
+
+    A point takes `size` bytes, and with all that share its trace so many seconds.
+    """
+    sizes = sweep.design.shape
+    traces, points = _MOST_SECONDS / trace, 1
+    if sweep.design.kind != "grid":
+        (count,) = sizes.values()
+        # As many points to a trace as in the mean
+        traces *= count / len(sweep.alike({"point": k} for k in range(count)))
+    joint = [axis.name for axis in sweep.joint]
     chunk = []
-    for size in reversed(sizes):
-        chunk.append(max(1, min(size, most)))
-        most //= size
+    for name, length in reversed(sizes.items()):
+        room = (_JOINT_BYTES if name in joint else _MOST_BYTES) / size / points
+        most = room if name in joint else min(room, traces)
+        chunk.append(max(1, min(length, int(most))))
+        points *= chunk[-1]
+        if name not in joint:
+            traces /= chunk[-1]
     return tuple(reversed(chunk))

@@ -27,7 +27,9 @@ MANY = SWEEP.replace(
     "[0.05, 0.1, 0.2]", "[0.05, 0.06, 0.07, 0.1, 0.12, 0.14, 0.17, 0.2, 0.22, 0.25]"
 ).replace("n_rays = 200", "n_rays = 10000")
 # Points of long runs have a group each; here short ones shall, in every process
-ALONE = "from pbrdf.sweeps import layout; layout._MOST_SECONDS = 0.0; "
+ALONE = (
+    "from pbrdf.sweeps import layout; layout._MOST_SECONDS = layout._JOINT_BYTES = 0.0; "
+)
 CLIENT = f"{ALONE}from pbrdf.cli import main; import sys; sys.exit(main())"
 VICTIMS = ("worker", "scheduler", "client")
 

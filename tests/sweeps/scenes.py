@@ -51,6 +51,7 @@ def by_points() -> Iterator[None]:
     """Give each point a group of its own, as points of long runs have."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(layout, "_MOST_SECONDS", 0.0)
+        patch.setattr(layout, "_JOINT_BYTES", 0.0)
         yield
 
 

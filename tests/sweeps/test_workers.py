@@ -26,7 +26,9 @@ MANY = SWEEP.replace(
     "[0.05, 0.1, 0.2]", "[0.05, 0.07, 0.1, 0.14, 0.17, 0.2, 0.22, 0.25]"
 ).replace("n_rays = 200", "n_rays = 20000")
 # Long runs have a group each; here short ones shall
-ALONE = "from pbrdf.sweeps import layout; layout._MOST_SECONDS = 0.0; "
+ALONE = (
+    "from pbrdf.sweeps import layout; layout._MOST_SECONDS = layout._JOINT_BYTES = 0.0; "
+)
 
 
 @pytest.fixture(scope="module")
