@@ -150,7 +150,9 @@ class Problem:
         objective = self.objective.with_parameters(held)
         return replace(self, parameters=held, objective=objective, search=None)
 
-    def solve(self, *, rounds: int = _ROUNDS, after: "Solved | None" = None) -> Solved:
+    def solve(
+        self, *, rounds: int = _ROUNDS, after: "Solved | None" = None, near: bool = False
+    ) -> Solved:
         """Fit, and where the noise is part of the question, fit and estimate it in turn.
 
         Parameters
@@ -159,6 +161,8 @@ class Problem:
             Limit of the turns.
         after : Solved, optional
             Earlier turns of this problem, to go on from.
+        near : bool
+            True where the start is nearly the minimum and need not be proven to be one.
         """
         objective = self.objective
         if after is not None:
@@ -170,7 +174,7 @@ class Problem:
         stderr = objective.stderr
         count = 0 if after is None else after.solution.n_evaluations
         for attempt in range(rounds if changes else 1):
-            if attempt == 0 and after is None:
+            if attempt == 0 and after is None and not near:
                 solution = self._minimise(objective)
             else:
                 solution = _REFINERS[self.solver](objective)

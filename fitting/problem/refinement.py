@@ -39,12 +39,12 @@ def solve_through_cones(problems: Sequence[Problem]) -> tuple[Problem, Solved]:
     first = problems[0].objective
     begin, stderr = first.start, first.stderr
     # The way there under one noise and in few turns; what follows goes to the end
-    for _ in range(_ROUNDS):
+    for attempt in range(_ROUNDS):
         cones = refined(problems[0], begin, stderr)
         if cones is None:
             break
         problems = _with_cones(problems, cones, begin)
-        solved = problems[0].solve(rounds=2)
+        solved = problems[0].solve(rounds=2, near=attempt > 0)
         if not solved.solution.converged:
             break
         begin, stderr = solved.solution.x, solved.objective.stderr

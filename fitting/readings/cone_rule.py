@@ -8,21 +8,23 @@ import numpy as np
 __all__ = ["FINEST", "RULES", "pairs"]
 
 # Rings, points on the outermost ring, and points an axis across the rest, ever finer. The
-# tilt of the facet depends on the rest in second order: two points an axis err by 0.7 % for
-# a slope of 0.003 in cones of 2 degrees, so it is refined too
+# tilt of the facet depends on the rest in second order: for a slope of 0.003 in cones of
+# 2 degrees one point errs by 0.1 %, two an axis by 0.02 %, three by 0.003 % at most
 RULES = (
     (2, 6, 1),
-    (3, 10, 2),
-    (4, 14, 3),
-    (6, 20, 3),
-    (8, 28, 3),
-    (12, 40, 3),
-    (16, 56, 4),
-    (24, 84, 4),
-    (36, 126, 5),
+    (3, 10, 1),
+    (4, 14, 2),
+    (6, 20, 2),
+    (8, 28, 2),
+    (12, 40, 2),
+    (16, 56, 2),
+    (24, 84, 2),
+    (36, 126, 3),
 )
 FINEST = len(RULES) - 1
 _LEAST_AROUND = 6
+# Slabs that stand for the shape of an overlap
+_SLABS = 32
 
 
 @lru_cache(maxsize=256)
@@ -76,17 +78,44 @@ def _lens(w: float, r_i: float, r_s: float, count: int) -> tuple[np.ndarray, np.
     else:
         foot = (w**2 + r_i**2 - r_s**2) / (2.0 * w)
         height = np.sqrt(max(r_i**2 - foot**2, 0.0))
+    # The overlap in slabs along w: their lengths are a density, and its Gauss rule has the
+    # nodes, so that few points have nearly the moments of the overlap
+    node, weight = np.polynomial.legendre.leggauss(_SLABS)
+    slab = height * np.sin(0.5 * np.pi * node)
+    low, high = _slab_ends(slab, w, r_i, r_s)
+    aside, share = _gauss(slab, weight * np.cos(0.5 * np.pi * node) * (high - low), count)
+    low, high = _slab_ends(aside, w, r_i, r_s)
     node, weight = np.polynomial.legendre.leggauss(count)
-    aside = height * np.sin(0.5 * np.pi * node)
-    slab = weight * np.cos(0.5 * np.pi * node)
-    half_i, half_s = (np.sqrt(np.maximum(r**2 - aside**2, 0.0)) for r in (r_i, r_s))
-    low, high = np.maximum(-half_i, w - half_s), np.minimum(half_i, w + half_s)
-    middle, half = 0.5 * (low + high), 0.5 * np.maximum(high - low, 0.0)
-    along = middle[:, None] + half[:, None] * node
-    area = (slab * half)[:, None] * weight
+    along = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * node
+    area = 0.5 * _overlap(w, r_i, r_s) * share[:, None] * weight
     points = np.stack([along, np.broadcast_to(aside[:, None], along.shape)], axis=-1)
-    area = area * (_overlap(w, r_i, r_s) / max(float(area.sum()), 1e-300))
     return points.reshape(-1, 2), area.ravel()
+
+
+def _slab_ends(
+    aside: np.ndarray, w: float, r_i: float, r_s: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return where the overlap begins and ends along w, beside its axis."""
+    half_i, half_s = (np.sqrt(np.maximum(r**2 - aside**2, 0.0)) for r in (r_i, r_s))
+    low = np.maximum(-half_i, w - half_s)
+    return low, np.maximum(np.minimum(half_i, w + half_s), low)
+
+
+def _gauss(x: np.ndarray, mass: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return nodes and shares of the Gauss rule of a density symmetric about 0.
+
+    The density is given by masses at points; Stieltjes' recurrence and the eigenvalues of
+    the Jacobi matrix, W. Gautschi, Orthogonal Polynomials (Oxford 2004), sections 2.2, 3.1.
+    """
+    mass = mass / mass.sum()
+    before, here = np.zeros(len(x)), np.ones(len(x))
+    beside = np.zeros(count - 1)
+    for k in range(count - 1):
+        after = x * here - (beside[k - 1] * before if k else 0.0)
+        beside[k] = np.sqrt((mass * after**2).sum())
+        before, here = here, after / beside[k]
+    node, vectors = np.linalg.eigh(np.diag(beside, 1) + np.diag(beside, -1))
+    return node, vectors[0] ** 2
 
 
 def _overlap(w: float, r_i: float, r_s: float) -> float:

@@ -19,6 +19,10 @@ __all__ = ["descend"]
 _STUCK = 1e8
 # Part of its size by which a parameter may change in one step
 _REACH = 0.5
+# Part of the fall that is enough, below which no step is tried
+_VAIN = 0.01
+# Part of the cost that rounding hides: the gradient alone judges such steps
+_ROUNDING = 1e-12
 # A parameter of which the square is varied must not stand still at 0
 _LEAST = 1e-5
 
@@ -45,7 +49,7 @@ def descend(
     """
     squared = np.array([parameter.squared for parameter in objective.parameters])
     x = objective.start
-    cost, count = objective.cost(x), 1
+    cost, count, unseen = objective.cost(x), 1, 0.0
     for _ in range(steps):
         gradient, curvature, unit = _quadratic(objective, x, squared)
         pressed = ((x <= objective.low) & (gradient > 0.0)) | (
@@ -60,6 +64,14 @@ def descend(
             move[free] = np.linalg.solve(damped, -gradient[free])
             there = _moved(objective, x, move / np.where(unit > 0.0, unit, 1.0), squared)
             there = x + _shortened(objective, x, there - x)
+            fall = _foretold(gradient, curvature, move)
+            if fall <= _VAIN * enough * cost or (unseen and fall > 0.1 * unseen):
+                return x, count
+            # A step that the damping has crushed foretells nothing
+            unseen = fall if fall <= _ROUNDING * cost and damping < 1.0 else 0.0
+            if unseen:
+                reached = cost
+                break
             reached, count = objective.cost(there), count + 1
             if reached < cost:
                 break
@@ -68,9 +80,14 @@ def descend(
             break
         fall, x, cost = cost - reached, there, reached
         damping = max(0.1 * damping, 1e-12)
-        if fall <= enough * cost:
+        if not unseen and fall <= enough * cost:
             break
     return x, count
+
+
+def _foretold(gradient: np.ndarray, curvature: np.ndarray, move: np.ndarray) -> float:
+    """Return the fall of the cost that the parabola promises."""
+    return -float(gradient @ move + 0.5 * move @ curvature @ move)
 
 
 def _quadratic(
