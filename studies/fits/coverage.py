@@ -2,7 +2,7 @@
 
     python studies/fits/coverage.py --scans 2000
 
-Prints one line a parameter: coverage, mean and standard deviation of the pulls
+Prints one line a parameter: coverage and its binomial error, mean and scatter of the pulls
 (estimate - truth) / stderr, and the stderr over the Cramér-Rao bound at the truth. A truth
 on its bound, the kappa of a dielectric, has a coverage and a one-sided scatter: it counts
 for the first and not for the pulls.
@@ -213,9 +213,11 @@ def report(case, rows, seconds):
         warnings.simplefilter("ignore", RuntimeWarning)
         mean, spread = np.nanmean(rows, axis=0), np.nanstd(rows, axis=0)
         ratio = np.nanmedian(rows[:, 2], axis=0)
+    counted = max(len(rows) - failures, 1)
     for i, name in enumerate(case.known):
         print(
-            f"  {name:30s} covered {mean[1, i]:6.1%}   "
+            f"  {name:30s} covered {mean[1, i]:6.2%} "
+            f"+- {np.sqrt(mean[1, i] * (1.0 - mean[1, i]) / counted):.2%}   "
             f"pull {mean[0, i]:+.3f} +- {spread[0, i]:.3f}   "
             f"stderr / bound {ratio[i]:.3f}",
             flush=True,
