@@ -27,8 +27,12 @@ CLASSES = {"above 10 %": 0.1, "1 % to 10 %": 0.01, "below 1 %": 0.0}
 SHARE = 0.9
 DARK, TINY = 0.01, 1e-300
 
-# Return (value predicted, value computed) with the node left out
-Trial = Callable[[int], tuple[np.ndarray, np.ndarray]]
+# A normal error exceeds so many standard deviations in the other directions
+OF_SHARE = 1.645
+
+# Return (value predicted, value computed, standard error of their difference) with the
+# node left out
+Trial = Callable[[int], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 
 def brightness(m00: np.ndarray) -> np.ndarray:
@@ -49,12 +53,16 @@ def floor(m00: np.ndarray) -> np.ndarray:
     return np.maximum(m00, DARK * m00.max((-2, -1), keepdims=True))
 
 
-def grouped(error: np.ndarray, value: np.ndarray) -> np.ndarray:
+def grouped(
+    error: np.ndarray, value: np.ndarray, noise: np.ndarray | None = None
+) -> np.ndarray:
     """Return what 90 % of the directions of each class err less than, in parts of `floor`.
 
     Parameters
     ----------
     error, value : ndarray, shape (..., theta_s, dphi, 4, 4)
+    noise : ndarray, of the same shape, optional
+        Standard error of the error, which is taken out in square: it is counted elsewhere.
 
     Returns
     -------
@@ -63,21 +71,30 @@ def grouped(error: np.ndarray, value: np.ndarray) -> np.ndarray:
     """
     m00 = value[..., 0, 0]
     kind = brightness(m00)
-    part = np.abs(error) / np.maximum(floor(m00), TINY)[..., None, None]
+    scale = np.maximum(floor(m00), TINY)[..., None, None]
+    part = np.abs(error) / scale
     found = np.zeros((len(CLASSES), 4, 4))
     for number in range(len(CLASSES)):
-        if (kind == number).any():
-            found[number] = np.quantile(part[kind == number], SHARE, axis=0)
+        here = kind == number
+        if here.any():
+            found[number] = np.quantile(part[here], SHARE, axis=0)
+            if noise is not None:
+                mean = ((noise / scale)[here] ** 2).mean(axis=0)
+                rest = found[number] ** 2 - OF_SHARE**2 * mean
+                found[number] = np.sqrt(np.maximum(rest, 0.0))
     return found
 
 
-def missed(trial: Trial) -> Callable[[int], np.ndarray]:
-    """Return what nodes are missed by when left out, by class; each is tried once."""
+def missed(trial: Trial, *, noisy: bool = False) -> Callable[[int], np.ndarray]:
+    """Return what nodes are missed by when left out, by class; each is tried once.
+
+    Without the noise of the simulation, or with it (`noisy`).
+    """
 
     @cache
     def found(left: int) -> np.ndarray:
-        predicted, computed = trial(left)
-        return grouped(predicted - computed, computed)
+        predicted, computed, noise = trial(left)
+        return grouped(predicted - computed, computed, None if noisy else noise)
 
     return found
 
@@ -88,7 +105,7 @@ def along(
     """Return the error at a place between nodes, as of `grouped`.
 
     What the nodes next to the place are missed by when left out goes with the defect of
-    the scheme, smaller in a gap than over two of them.
+    the scheme, smaller in a gap than over two of them; of two nodes the worse one counts.
     """
     here = scheme.defect(nodes, place)
     if here == 0.0:
@@ -127,12 +144,20 @@ def best(nodes: np.ndarray, trial: Callable[[Scheme], Trial]) -> Measured:
     tried = []
     for scheme in SCHEMES.values():
         if scheme.fits(nodes):
-            found = missed(trial(scheme))
-            at_nodes = np.max([found(k) for k in range(1, len(nodes) - 1)], axis=0)
-            gaps = 0.5 * (nodes[1:] + nodes[:-1])
-            between = np.max([along(scheme, nodes, gap, found) for gap in gaps], axis=0)
-            tried.append(Measured(scheme, at_nodes, between))
-    return min(tried, key=lambda one: one.between[:2, 0, 0].max())
+            # Chosen with the noise, which some schemes make larger
+            each = _measured(scheme, nodes, missed(trial(scheme), noisy=True))
+            tried.append(each)
+    chosen = min(tried, key=lambda one: one.between[:2, 0, 0].max()).scheme
+    return _measured(chosen, nodes, missed(trial(chosen)))
+
+
+def _measured(
+    scheme: Scheme, nodes: np.ndarray, found: Callable[[int], np.ndarray]
+) -> Measured:
+    at_nodes = np.max([found(k) for k in range(1, len(nodes) - 1)], axis=0)
+    gaps = 0.5 * (nodes[1:] + nodes[:-1])
+    between = np.max([along(scheme, nodes, gap, found) for gap in gaps], axis=0)
+    return Measured(scheme, at_nodes, between)
 
 
 def parameter_trial(
@@ -140,14 +165,14 @@ def parameter_trial(
 ) -> Trial:
     """Return the trial of nodes that lie along the first axis of the values."""
 
-    def trial(left: int) -> tuple[np.ndarray, np.ndarray]:
+    def trial(left: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         held = np.delete(np.arange(len(nodes)), left)
         index, weight = scheme.weights(nodes[held], float(nodes[left]))
         at = held[index]
-        found, _ = combined(
+        found, spread = combined(
             weight, np.moveaxis(value[at], 0, -3), np.moveaxis(stderr[at], 0, -3),
-            log=scheme.log,
+            log=scheme.log, apart=True,
         )  # fmt: skip
-        return found, value[left]
+        return found, value[left], np.hypot(spread, stderr[left])
 
     return trial

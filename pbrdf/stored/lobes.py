@@ -43,8 +43,7 @@ class Lobes:
         into, out = turns(*grid)
         local = np.swapaxes(out, -1, -2) @ self.value @ into
         object.__setattr__(self, "_local", local)
-        # Sizes of a turned error: no more than the elements that mix give
-        spread = np.abs(np.swapaxes(out, -1, -2)) @ self.stderr @ np.abs(into)
+        spread = turned(np.swapaxes(out, -1, -2), self.stderr, into)
         object.__setattr__(self, "_spread", spread)
 
     def brdf(
@@ -53,16 +52,18 @@ class Lobes:
         theta_s: np.ndarray,
         dphi: np.ndarray,
         without: int | None = None,
+        apart: bool = False,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return matrices and standard errors at directions of one shape (n,).
 
-        `without` leaves one incidence out, to see what it is worth.
+        `without` leaves one incidence out, to see what it is worth; `apart` as of
+        `combined`.
         """
         held = np.arange(len(self.theta_i))
         held = held if without is None else np.delete(held, without)
         facet = half_vector(theta_i, theta_s, dphi)
         if len(held) == 1:
-            value, stderr = self._mirrored(np.zeros(theta_i.size, int), facet)
+            value, stderr = self._mirrored(held[np.zeros(theta_i.size, int)], facet)
         else:
             index, weight = self.scheme.weights(self.theta_i[held], theta_i)
             read = [self._mirrored(held[column], facet) for column in index.T]
@@ -71,12 +72,13 @@ class Lobes:
                 np.stack([one for one, _ in read], axis=1),
                 np.stack([one for _, one in read], axis=1),
                 log=self.scheme.log,
+                apart=apart,
             )
         both = (np.cos(theta_i) + np.cos(theta_s))[:, None, None]
         value, stderr = value / both, stderr / both
         into, out = turns(theta_i, theta_s, dphi)
         back = np.swapaxes(into, -1, -2)
-        return out @ value @ back, np.abs(out) @ stderr @ np.abs(back)
+        return out @ value @ back, turned(out, stderr, back)
 
     def _mirrored(
         self, node: np.ndarray, facet: np.ndarray
@@ -91,17 +93,22 @@ class Lobes:
         # Light that would go below the horizon stands for what just clears it
         theta_s = np.arctan2(np.hypot(out[:, 0], out[:, 1]), out[:, 2])
         theta_s = np.minimum(theta_s, np.pi / 2)
-        value, stderr = self._between(node, theta_s, np.arctan2(out[:, 1], out[:, 0]))
+        azimuth = np.arctan2(out[:, 1], out[:, 0])
+        value, stderr = self._between(node, theta_s, azimuth)
         both = (np.cos(self.theta_i[node]) + np.cos(theta_s))[:, None, None]
         return both * value, both * stderr
+
+    def place(self, theta_s: np.ndarray, dphi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return directions in bins: 0 at the first centre, one more at the next."""
+        step, turn = self.theta_s[1] - self.theta_s[0], 2 * np.pi / self.dphi.size
+        row = np.minimum((theta_s - self.theta_s[0]) / step, self.theta_s.size - 1.0)
+        return row, np.mod(dphi, 2 * np.pi) / turn
 
     def _between(
         self, node: np.ndarray, theta_s: np.ndarray, dphi: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Interpolate between the centres of four bins."""
-        step, turn = self.theta_s[1] - self.theta_s[0], 2 * np.pi / self.dphi.size
-        row = np.minimum((theta_s - self.theta_s[0]) / step, self.theta_s.size - 1.0)
-        column = np.mod(dphi, 2 * np.pi) / turn
+        row, column = self.place(theta_s, dphi)
         low, left = np.floor(row).astype(int), np.floor(column).astype(int)
         up, right = row - low, column - left
         value, stderr, weight = [], [], []
@@ -115,8 +122,9 @@ class Lobes:
                 stderr.append(self._spread[node, on, at])  # type: ignore[attr-defined]
                 weight.append(part * share)
         return combined(
-            np.stack(weight, -1), np.stack(value, 1), np.stack(stderr, 1), log=True
-        )
+            np.stack(weight, -1), np.stack(value, 1), np.stack(stderr, 1), log=True,
+            apart=True,
+        )  # fmt: skip
 
 
 def half_vector(theta_i: np.ndarray, theta_s: np.ndarray, dphi: np.ndarray) -> np.ndarray:
@@ -147,6 +155,11 @@ def turns(
         e_p = np.cross(prop, e_s)
         found.append(_rotation((across * e_s).sum(-1), (across * e_p).sum(-1)))
     return found[0], found[1]
+
+
+def turned(left: np.ndarray, stderr: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return the error of left @ value @ right, of elements that err each by itself."""
+    return np.asarray(np.sqrt(left**2 @ stderr**2 @ right**2))
 
 
 def _rotation(cosine: np.ndarray, sine: np.ndarray) -> np.ndarray:

@@ -129,7 +129,12 @@ SCHEMES = {
 
 
 def combined(
-    weight: np.ndarray, value: np.ndarray, stderr: np.ndarray, *, log: bool
+    weight: np.ndarray,
+    value: np.ndarray,
+    stderr: np.ndarray,
+    *,
+    log: bool,
+    apart: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Put the Mueller matrices of several nodes together.
 
@@ -142,16 +147,18 @@ def combined(
     log : bool
         As of `Scheme`; where a node is too dark or too noisy for that, the positive weights
         mix the matrices themselves.
+    apart : bool
+        Whether neighbours err each by itself, so that squares of errors add. They may err
+        together, so that errors add without it.
 
     Returns
     -------
     ndarray, ndarray, shape (..., 4, 4)
-        Neighbours may err together, so that their errors add.
     """
     mixing = np.maximum(weight, 0.0) if log else weight
     mixing = mixing / mixing.sum(-1, keepdims=True)
     plain = np.einsum("...k,...kij->...ij", mixing, value)
-    spread = np.einsum("...k,...kij->...ij", np.abs(mixing), stderr)
+    spread = _spread(mixing, stderr, apart)
     if not log:
         return plain, spread
     m00 = value[..., 0, 0]
@@ -165,6 +172,13 @@ def combined(
         np.nanmax(used, -1) * BEYOND,
     )[..., None, None]
     shape = np.einsum("...k,...kij->...ij", weight, value / safe[..., None, None])
-    errs = np.einsum("...k,...kij->...ij", np.abs(weight), stderr / safe[..., None, None])
+    errs = _spread(weight, stderr / safe[..., None, None], apart)
     here = known[..., None, None]
     return np.where(here, level * shape, plain), np.where(here, level * errs, spread)
+
+
+def _spread(weight: np.ndarray, stderr: np.ndarray, apart: bool) -> np.ndarray:
+    """Return the error of a sum over nodes that err each by itself, or all together."""
+    if apart:
+        return np.asarray(np.sqrt(np.einsum("...k,...kij->...ij", weight**2, stderr**2)))
+    return np.asarray(np.einsum("...k,...kij->...ij", np.abs(weight), stderr))

@@ -33,6 +33,8 @@ __all__ = ["StoredBRDF", "from_store"]
 
 # Points of the parameters that stay in memory, and directions at once
 _KEPT, _AT_ONCE = 8, 20_000
+# Beyond this miss of a value left out, in parts of M00, errors do not scale to gaps
+COARSE = 0.5
 
 
 def from_store(path: str | Path) -> "StoredBRDF":
@@ -287,7 +289,9 @@ class StoredBRDF:
                     theta_i[rows], theta_s[rows], dphi[rows]
                 )
                 if error:
-                    between[rows] = point.between(theta_i[rows], value[rows, 0, 0])
+                    between[rows] = point.between(
+                        theta_i[rows], theta_s[rows], dphi[rows], value[rows, 0, 0]
+                    )
         whole = (*shape, 4, 4)
         return value.reshape(whole), stderr.reshape(whole), between.reshape(whole)
 
@@ -350,11 +354,11 @@ class StoredBRDF:
             value, stderr = self._reduced(place, keep=name)
             if len(nodes) == 2:
                 share = (place[name] - nodes[0]) / (nodes[1] - nodes[0])
-                total = total + midway(value[0], value[1], share)
+                total = np.hypot(total, midway(value[0], value[1], share))
             else:
                 scheme = self._scheme(name)
                 found = missed(parameter_trial(scheme, nodes, value, stderr))
-                total = total + along(scheme, nodes, place[name], found)
+                total = np.hypot(total, along(scheme, nodes, place[name], found))
         return total
 
     def _reduced(
@@ -401,6 +405,7 @@ class StoredBRDF:
                     for array in self._contents.read(line)
                 )
                 found[name] = _measure(name, one.nodes, value, stderr)
+                _warn_if_coarse(name, found[name])
         value, stderr = (
             array.reshape(array.shape[len(middle) :])
             for array in self._contents.read(middle)
@@ -412,6 +417,7 @@ class StoredBRDF:
             found["theta_i"] = best(
                 nodes, lambda scheme: incidence_trial(self._lobes(value, stderr, scheme))
             )
+            _warn_if_coarse("theta_i", found["theta_i"])
         return found
 
 
@@ -429,6 +435,18 @@ def _measure(
     if len(nodes) == 2:
         return _of_two(name, value)
     return best(nodes, lambda scheme: parameter_trial(scheme, nodes, value, stderr))
+
+
+def _warn_if_coarse(name: str, measured: Measured) -> None:
+    """Say where values lie so far apart that left-out ones tell nothing of the gaps."""
+    worst = float(measured.at_nodes[0, 0, 0])
+    if worst > COARSE:
+        msg = (
+            f"the store's values of {name} must lie closer: one of them left out is missed "
+            f"by {100 * worst:.2g} % of M00 where it is bright, which says little of the "
+            "gaps. Errors between them are guesses. Compute more values by a sweep."
+        )
+        warnings.warn(msg, AccuracyWarning, stacklevel=2)
 
 
 def _of_two(name: str, value: np.ndarray) -> Measured:

@@ -53,8 +53,8 @@ def test_it_is_continuous_and_keeps_mirror_symmetry_of_frames(store: Path) -> No
 def test_the_stated_error_holds_at_fresh_points_and_seeds(store: Path) -> None:
     """Against direct runs of many more rays, in bins half as wide about other centres."""
     source = pbrdf.from_store(store)
-    rng = np.random.default_rng()
-    held, sizes = [], []
+    rng = np.random.default_rng(8)
+    parts, sizes = [], []
     for _ in range(4):
         slope, index = rng.uniform(0.125, 0.29), rng.uniform(1.42, 1.68)
         theta_i = np.deg2rad(rng.uniform(12, 53))
@@ -75,14 +75,16 @@ def test_the_stated_error_holds_at_fresh_points_and_seeds(store: Path) -> None:
         found = source.brdf(*where, slope_rms=slope, n=index)
         stated = source.error(*where, slope_rms=slope, n=index)
         bright = wanted[..., 0, 0] > 0.01 * wanted[..., 0, 0].max()
-        within = np.abs(found - wanted) <= np.hypot(stated, noise)
-        held.append(within[bright].mean(0))
+        parts.append((np.abs(found - wanted) / np.hypot(stated, noise))[bright])
         # An error that holds because it is huge is no use
         part = (stated / found[..., :1, :1])[bright][:, 0, 0]
         sizes.append(np.median(part))
-    assert np.mean(held, axis=0)[0, 0] >= 0.9, (held, sizes)
-    assert np.mean(held, axis=0).min() >= 0.85
-    assert np.median(sizes) < 0.25
+    # What is stated over what holds in nine of ten directions, for each element
+    ratio = 1.0 / np.quantile(np.concatenate(parts), 0.9, axis=0)
+    assert 0.9 < np.median(ratio) < 2.0, ratio
+    assert ratio.min() > 0.7, ratio
+    assert ratio.max() < 3.0, ratio
+    assert np.median(sizes) < 0.12
 
 
 def test_interpolation_respects_the_lobe(store: Path) -> None:
