@@ -155,7 +155,7 @@ def require(
             value = array[index]
             place = f" at index {index[0] if len(index) == 1 else index}"
         hidden = isinstance(_joined(values), np.ma.MaskedArray) and np.isnan(value)
-        got = "a masked value" if hidden else f"{value:.17g}"
+        got = "a masked value" if hidden else repr(float(value)).removesuffix(".0")
         msg = f"{name} must {rule}, got {got}{place}. {cure}"
         raise ValueError(msg)
     return array

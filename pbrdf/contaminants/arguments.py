@@ -9,6 +9,8 @@ from pbrdf.errors import require
 from pbrdf.optics import library
 from pbrdf.optics.materials import Material
 
+# Lengths beyond are slips of units [um]
+LONGEST = 1e9
 UNIT_CURE = "Lengths are micrometres, areas and volumes their powers."
 
 
@@ -26,13 +28,15 @@ def material_of(value: Material | str) -> Material:
 
 
 def positive(name: str, value: Any, unit: str = "um") -> float:
-    """Return one positive finite number."""
+    """Return one positive finite number; lengths [um] end at a kilometre."""
     number = require(
         name, value, lambda v: (v > 0) & np.isfinite(v), f"be positive [{unit}]", UNIT_CURE
     )
     if number.ndim:
         msg = f"{name} must be one number [{unit}], got shape {number.shape}. {UNIT_CURE}"
         raise ValueError(msg)
+    if unit == "um":
+        require(name, number, lambda v: v <= LONGEST, "be at most 1e9 um, 1 km", UNIT_CURE)
     return float(number)
 
 

@@ -24,15 +24,17 @@ class Dispersion(Protocol):
 
 
 def require_in_range(
-    wavelength: npt.ArrayLike, valid_range: tuple[float, float]
+    wavelength: npt.ArrayLike,
+    valid_range: tuple[float, float],
+    owner: str = "its source",
 ) -> np.ndarray:
-    """Return the wavelengths, or raise an error that names the range of the source."""
+    """Return the wavelengths, or raise an error that names the range and whose it is."""
     low, high = valid_range
     return require(
         "wavelength",
         wavelength,
         lambda v: (v >= low) & (v <= high),
-        f"lie in [{low:g}, {high:g}] um, the range of its source",
+        f"lie in [{low:g}, {high:g}] um, the range of {owner}",
         "Optical constants are not extrapolated; wavelengths are in micrometres.",
     )
 

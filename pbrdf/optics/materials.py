@@ -10,7 +10,7 @@ import numpy.typing as npt
 from pbrdf.errors import require
 from pbrdf.notebook import table
 from pbrdf.optics.checks import checked_kappa, checked_n
-from pbrdf.optics.dispersion import Dispersion, Table
+from pbrdf.optics.dispersion import Dispersion, Table, require_in_range
 
 __all__ = ["Material"]
 
@@ -121,7 +121,7 @@ class Material:
         Traceback (most recent call last):
         ...
         ValueError: wavelength must lie in [0.4, 0.8] um, the range of its source, got \
-0.90000000000000002. Optical constants are not extrapolated; wavelengths are in micrometres.
+0.9. Optical constants are not extrapolated; wavelengths are in micrometres.
         """
         absorption = kappa if np.ndim(kappa) == 0 else Table.of("kappa", wavelength, kappa)
         albedo: Any = diffuse_albedo
@@ -192,7 +192,7 @@ class Material:
                 f"Pass one between {low:g} and {high:g} um."
             )
             raise ValueError(msg)
-        return _at(self.diffuse_albedo, wavelength)
+        return self._at(self.diffuse_albedo, wavelength)
 
     def index(self, wavelength: float | None = None) -> tuple[float, float]:
         """(n, kappa) at one vacuum wavelength [um].
@@ -216,16 +216,19 @@ class Material:
                 f"got None. Pass one between {low:g} and {high:g} um."
             )
             raise ValueError(msg)
-        n = _at(self.n, wavelength)
-        kappa = _at(self.kappa, wavelength)
+        n = self._at(self.n, wavelength)
+        kappa = self._at(self.kappa, wavelength)
         return n, kappa
 
-
-def _at(constant: float | Dispersion, wavelength: npt.ArrayLike | None) -> np.ndarray:
-    """Evaluate a dispersion; a number stays as it is."""
-    if callable(constant):
-        return constant(np.nan if wavelength is None else wavelength)
-    return np.asarray(constant, dtype=np.float64)
+    def _at(
+        self, constant: float | Dispersion, wavelength: npt.ArrayLike | None
+    ) -> np.ndarray:
+        """Evaluate a dispersion; a number stays as it is."""
+        if not callable(constant):
+            return np.asarray(constant, dtype=np.float64)
+        asked = np.nan if wavelength is None else wavelength
+        owner = self.name or "its source"
+        return constant(require_in_range(asked, constant.valid_range, owner))
 
 
 def _scalar(name: str, value: Any) -> float:

@@ -17,6 +17,7 @@ from pbrdf.scene.toml_tables import (
     check_present,
     kind_of,
     material_table,
+    refused,
 )
 from pbrdf.scene.toml_tables import read_material as read_material_table
 
@@ -112,8 +113,7 @@ def read_contaminant(table: Mapping[str, Any], source: Path) -> Drops | Spheres 
                 given[name] = _from_file(key, table[key], unit)
         return KINDS[kind](**given)
     except (TypeError, ValueError) as error:
-        problem = f"[{PLACE} {kind}]: {str(error).rstrip('.')}"
-        raise DataFileError(source, problem, "See the documented keys.") from error
+        raise refused(table, f"{PLACE} {kind}", source, error) from error
 
 
 def contaminant_keys(kind: str) -> set[str]:

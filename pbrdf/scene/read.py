@@ -18,6 +18,7 @@ from pbrdf.scene.toml_tables import (
     check_present,
     kind_of,
     read_material,
+    refused,
     required,
 )
 from pbrdf.surface import GaussianSurface, HeightMap, MeasuredSurface, MeshSurface, Surface
@@ -68,15 +69,22 @@ def scene_of(document: Mapping[str, Any], source: Path) -> Scene:
             raise DataFileError(source, f"unknown key {key!r}", f"A scene has {known}.")
     surface = required(document, "surface", source)
     substrate = required(document, "substrate", source)
+    wrong = TypeError, ValueError, OverflowError, IndexError
+    try:
+        ground = _read_surface(surface, source)
+    except DataFileError:
+        raise
+    except wrong as error:
+        raise refused(surface, "surface", source, error) from error
     try:
         return Scene(
-            _read_surface(surface, source),
+            ground,
             _read_substrate(substrate, source),
             _read_contaminants(document.get("contaminants", []), source),
         )
     except DataFileError:
         raise
-    except (TypeError, ValueError, OverflowError, IndexError) as error:
+    except wrong as error:
         problem = str(error).rstrip(".")
         raise DataFileError(source, problem, "See the documented keys.") from error
 

@@ -1,5 +1,6 @@
 """Tables of TOML files: keys that are known, values of the right kind, materials."""
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -51,6 +52,17 @@ def check_present(
     for key in keys:
         if key not in table:
             raise DataFileError(source, f"[{place}]: key {key!r} is missing", "Give it.")
+
+
+def refused(
+    table: Mapping[str, Any], place: str, source: Path, error: Exception
+) -> DataFileError:
+    """Say what is wrong with an argument in the words of the file: its keys."""
+    problem = str(error).rstrip(".")
+    for key in table:
+        argument = re.sub("_um3?$", "", key)
+        problem = re.sub(rf"^{re.escape(argument)} must", f"{key} must", problem)
+    return DataFileError(source, f"[{place}]: {problem}", "See the documented keys.")
 
 
 def check_numbers(
@@ -147,8 +159,7 @@ def _read_constant(key: str, value: Any, place: str, source: Path) -> Any:
     try:
         return _of_table(key, value, place, source)
     except (TypeError, ValueError, IndexError) as error:
-        problem = f"[{place}.{key}]: {str(error).rstrip('.')}"
-        raise DataFileError(source, problem, "See the documented keys.") from error
+        raise refused(value, f"{place}.{key}", source, error) from error
 
 
 def _of_table(key: str, value: dict[str, Any], place: str, source: Path) -> Any:
@@ -204,8 +215,7 @@ def read_material(table: Mapping[str, Any], place: str, source: Path) -> Materia
             return Material(**table)
         return Material.from_table(wavelength=table.pop("wavelength_um"), **table)
     except (TypeError, ValueError) as error:
-        problem = f"[{place}]: {str(error).rstrip('.')}"
-        raise DataFileError(source, problem, "See the documented keys.") from error
+        raise refused(table, place, source, error) from error
 
 
 def _material_of_file(table: Mapping[str, Any], place: str, source: Path) -> Material:

@@ -132,3 +132,31 @@ def test_missing_and_binary_files(tmp_path):
     (tmp_path / "binary.toml").write_bytes(bytes(range(128, 256)))
     with pytest.raises(DataFileError, match="not a text file"):
         load_scene(tmp_path / "binary.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            "corr_length_um = -8.0",
+            r"\[surface\]: corr_length_um must be positive, got -8\.",
+        ),
+        (
+            "height_rms_um = -0.2",
+            r"\[surface\]: height_rms_um must be positive, got -0\.2\.",
+        ),
+    ],
+)
+def test_errors_name_the_keys_of_the_file(tmp_path, text, words):
+    given = {
+        "shape": "[64, 64]", "spacing_um": "0.5", "corr_length_um": "8.0",
+        "height_rms_um": "0.7",
+    }  # fmt: skip
+    key, value = text.split(" = ")
+    lines = [f"{k} = {v}" for k, v in (given | {key: value}).items()]
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        "\n".join(['[surface]\ntype = "gaussian"', *lines, "[substrate]\nn=1.5"])
+    )
+    with pytest.raises(DataFileError, match=words):
+        load_scene(path)

@@ -75,7 +75,7 @@ material = { n = 1.5, kappa = 0.02 }
         ("thickness_um = 1", r"\[contaminants\]: type is None"),
         ('type = "film"', r"\[contaminants film\]: key 'thickness_um' is missing"),
         ('type = "film"\nthickness = 1', r"unknown key 'thickness'. Known: level"),
-        ('type = "film"\nthickness_um = -1', r"thickness must be positive \[um\], got"),
+        ('type = "film"\nthickness_um = -1', r"thickness_um must be positive \[um\], got"),
         ('type = "film"\nthickness_um = "1 um"', r"'thickness_um' holds '1 um'. Write"),
         ('type = "film"\nthickness_um = 1\nmaterial = "wter"', r"material must be one"),
         ('type = "film"\nthickness_um = 1\nmaterial = 1.3', r"material must be a Mat"),
@@ -90,6 +90,7 @@ material = { n = 1.5, kappa = 0.02 }
         ('type = "drops"\ncontact_angle_deg = 9\npositions_um = [[1, 2], [3]]',
          r"'positions_um' is \[\[1, 2\], \[3\]\]"),
         ('type = "spheres"\nradius_um = 1', r"key 'material' is missing"),
+        ('type = "film"\nthickness_um = 1e300', r"thickness_um must be at most 1e9 um"),
     ],
 )  # fmt: skip
 def test_wrong_tables_are_told_what_is_wrong(text, message, tmp_path):
