@@ -43,7 +43,11 @@ WAVES = np.linspace(0.4, 0.7, 20)
 _SELLMEIER = Material.from_table(
     wavelength=WAVES, n=1.5 + 0.004 / WAVES**2, kappa=np.zeros(20)
 )
-DEW = Drops(contact_angle=np.pi / 2, coverage=0.15, number_density=1e-4)
+# Flat, half-round and nearly whole drops
+DEWS = {
+    angle: Drops(contact_angle=np.deg2rad(angle), coverage=0.15, number_density=1e-4)
+    for angle in (15, 90, 179)
+}
 
 CASES = (
     Case(
@@ -70,9 +74,16 @@ CASES = (
         name="20 wavelengths", scene=_rough(0.30, _SELLMEIER), theta_i=np.deg2rad(60.0),
         options={"wavelength": WAVES},
     ),
+    *(
+        Case(
+            name=f"dew {angle}", scene=_rough(0.05, GLASS, drops), theta_i=np.deg2rad(41.4),
+            options={"wavelength": 0.55},
+        )
+        for angle, drops in DEWS.items()
+    ),
     Case(
-        name="dew", scene=_rough(0.05, GLASS, DEW), theta_i=np.deg2rad(41.4),
-        options={"wavelength": 0.55, "phi_i": "uniform"},
+        name="dew all around", scene=_rough(0.05, GLASS, DEWS[90]),
+        theta_i=np.deg2rad(41.4), options={"wavelength": 0.55, "phi_i": "uniform"},
     ),
     Case(name="map", scene=_map, theta_i=np.deg2rad(41.4)),
 )  # fmt: skip

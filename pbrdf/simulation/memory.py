@@ -11,7 +11,7 @@ from pbrdf.kernels.paths.shading import N_RECORD
 from pbrdf.kernels.paths.spectra import N_SUMS
 from pbrdf.kernels.sights.light import N_CELL
 from pbrdf.scene.scene import Scene
-from pbrdf.simulation.single_bounce import LEAST_DPHI, LEAST_THETA
+from pbrdf.simulation.singles.single_bounce import LEAST_DPHI, LEAST_THETA
 from pbrdf.simulation.spectra import BUFFER, WORTHWHILE
 from pbrdf.surface import GaussianSurface
 from pbrdf.tracer import arguments

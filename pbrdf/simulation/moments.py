@@ -16,9 +16,9 @@ from pbrdf.kernels.bins.moments import Running, add_sample, fold_lit, fold_sampl
 from pbrdf.kernels.paths import shading
 from pbrdf.kernels.paths.path_buffer import OVERFLOWED
 from pbrdf.kernels.paths.spectra import Room, add_spectrum
-from pbrdf.simulation.balance import Balance
 from pbrdf.simulation.plan import Plan, Tally
-from pbrdf.simulation.single_bounce import SingleBounce
+from pbrdf.simulation.singles.balance import Balance
+from pbrdf.simulation.singles.single_bounce import SingleBounce
 
 # Wavelengths that one thread adds at a time, and parts of the spectrum at most
 PER_PART, MOST_PARTS = 4, 16

@@ -15,7 +15,7 @@ from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.results import judged_before, labelled
 from pbrdf.simulation.run import planned, prepared, simulate, traced, wants_looks
 from pbrdf.simulation.samples import Ready, trace_samples
-from pbrdf.simulation.single_bounce import SingleBounce, can_do_without
+from pbrdf.simulation.singles.single_bounce import SingleBounce, can_do_without
 from pbrdf.surface import Surface
 from pbrdf.tracer import arguments
 

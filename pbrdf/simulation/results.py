@@ -31,8 +31,8 @@ from pbrdf.scene.scene import Scene
 from pbrdf.scene.write import scene_text
 from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.plan import Plan
-from pbrdf.simulation.samples import Ready
-from pbrdf.simulation.single_bounce import SingleBounce
+from pbrdf.simulation.samples import Ready, Singles
+from pbrdf.simulation.singles.beside_bodies import BesideBodies
 from pbrdf.simulation.skips import explanation, mesh_explanation
 from pbrdf.simulation.waves import join_waves
 from pbrdf.surface import HeightMap, MeshSurface
@@ -174,7 +174,7 @@ def labelled(
             "folded": plan.fold,
             "intersector": _intersector(scene, plan.skips),
             "plan": ready.chosen,
-            "variance_reduction": "none" if single is None else "single bounces",
+            "variance_reduction": _reduction(single),
             "explanation": _explain(scene, plan, single) if given["explain"] else [],
             "contaminants": [str(dict(report)) for report in moments[0].reports],
             "warnings": [*judged.notes, *late, *judged.remarks, *cut],
@@ -235,7 +235,7 @@ def _thin_films(scene: Scene, moments: Moments, waves: np.ndarray | None) -> lis
     )
 
 
-def _explain(scene: Scene, plan: Plan, single: Sequence[SingleBounce] | None) -> list[str]:
+def _explain(scene: Scene, plan: Plan, single: Singles) -> list[str]:
     surface = scene.surface
     if isinstance(surface, MeshSurface):
         return mesh_explanation(plan, faces=len(surface.faces), kind=surface.kind)
@@ -243,6 +243,14 @@ def _explain(scene: Scene, plan: Plan, single: Sequence[SingleBounce] | None) ->
     steepest = float(Field.of(sample).terrain.steepest)
     lines = explanation(plan, periodic=sample.periodic, steepest=steepest)
     return lines + (single[0].explanation() if single else [])
+
+
+def _reduction(single: Singles) -> str:
+    """Name what makes the noise less."""
+    if single is None:
+        return "none"
+    beside = isinstance(single[0], BesideBodies)
+    return "single bounces beside bodies" if beside else "single bounces"
 
 
 def _intersector(scene: Scene, allowed: frozenset[str]) -> str:

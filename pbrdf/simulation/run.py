@@ -17,8 +17,9 @@ from pbrdf.simulation.memory import OF_SIZE, asked_size, check_run
 from pbrdf.simulation.pilot import choose
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.results import judged_before, labelled
-from pbrdf.simulation.samples import Ready, trace_samples
-from pbrdf.simulation.single_bounce import without_rays
+from pbrdf.simulation.samples import Ready, Singles, trace_samples
+from pbrdf.simulation.singles.beside_bodies import beside_bodies
+from pbrdf.simulation.singles.single_bounce import without_rays
 from pbrdf.simulation.skips import chosen_skips
 from pbrdf.simulation.waves import check_waves
 from pbrdf.surface import MeshSurface
@@ -173,10 +174,11 @@ SWITCHES = ("variance_reduction", "explain")
 def prepared(*, whole: bool = True, **given: Any) -> Ready:
     """Check and plan a run, by the arguments of `simulate`; `whole` if all is kept."""
     ready = planned(whole=whole, **given)
-    scene, plans = ready.run.scene, ready.plans
-    return replace(
-        ready, single=without_rays(scene, plans, wanted=wants_looks(ready.run, given))
-    )
+    scene, plans, wanted = ready.run.scene, ready.plans, wants_looks(ready.run, given)
+    single: Singles = without_rays(scene, plans, wanted=wanted)
+    if single is None:
+        single = beside_bodies(scene, plans, ready.run.samples, wanted=wanted)
+    return replace(ready, single=single)
 
 
 def wants_looks(run: Run, given: Mapping[str, Any]) -> bool:

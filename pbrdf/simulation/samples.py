@@ -12,7 +12,8 @@ import numpy as np
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.plan import Plan, Tally
-from pbrdf.simulation.single_bounce import SingleBounce
+from pbrdf.simulation.singles.beside_bodies import BesideBodies
+from pbrdf.simulation.singles.single_bounce import SingleBounce
 from pbrdf.simulation.trace import Target, prepare, trace_sample
 from pbrdf.surface import FixedSurface, HeightMap, MeshSurface
 from pbrdf.tracer import arguments
@@ -22,6 +23,9 @@ from pbrdf.tracer.field import Field
 from pbrdf.tracer.schedule import gather
 from pbrdf.tracer.wet_field import WetField
 from pbrdf.tracer.wet_mesh import WetMesh
+
+# What is known of the single bounces of each plan
+Singles = Sequence[SingleBounce | BesideBodies] | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +38,7 @@ class Ready:
     run: Run
     plans: list[Plan]
     several: bool
-    single: list[SingleBounce] | None
+    single: Singles
     chosen: list[str]
     given: dict[str, Any]
 
@@ -48,7 +52,7 @@ class Ready:
 
 
 def trace_samples(
-    run: Run, plans: Sequence[Plan], single: Sequence[SingleBounce] | None
+    run: Run, plans: Sequence[Plan], single: Singles
 ) -> tuple[list[Moments], int]:
     """Trace samples until there are enough: the moments of each plan, and how many."""
     # Tallies to use again: to make a large one costs more than to clear it
@@ -59,9 +63,9 @@ def trace_samples(
         draw = partial(_trace_fixed, _realize(run.scene, plans[0], first), plans, spare)
     else:
         draw = partial(_trace_realization, run.scene, plans, single, spare)
-    moments = [
-        Moments(one, None if single is None else single[k]) for k, one in enumerate(plans)
-    ]
+    moments = [Moments(one) for one in plans]
+    if clean := [one for one in single or () if isinstance(one, SingleBounce)]:
+        moments = [Moments(*both) for both in zip(plans, clean, strict=True)]
 
     def add(tallies: Sequence[Tally], each: Callable[..., Iterable[Any]]) -> None:
         for one, tally in zip(moments, tallies, strict=True):
@@ -114,14 +118,17 @@ def _trace_fixed(
 def _trace_realization(
     scene: Scene,
     plans: Sequence[Plan],
-    single: Sequence[SingleBounce] | None,
+    single: Singles,
     spare: deque[Tally],
     seed: np.random.SeedSequence,
 ) -> list[Tally]:
     heights, rays, looks = seed.spawn(3)
     if single is None:
         return _trace_fixed(_realize(scene, plans[0], heights), plans, spare, rays)
-    if all(one.everything for one in single):
+    if beside := [one for one in single if isinstance(one, BesideBodies)]:
+        return _trace_beside_bodies(scene, plans, beside, spare, (heights, rays, looks))
+    clean = [one for one in single if isinstance(one, SingleBounce)]
+    if all(one.everything for one in clean):
         tallies = [_taken(spare) or Tally.empty(plan) for plan in plans]
         terrain = None
     else:
@@ -129,6 +136,24 @@ def _trace_realization(
         tallies = _trace_fixed(target, plans, spare, rays)
         assert isinstance(target, (Field, EmbreeField))  # no bodies on it
         terrain = (target if isinstance(target, Field) else target.field).terrain
-    for plan, one, tally in zip(plans, single, tallies, strict=True):
+    for plan, one, tally in zip(plans, clean, tallies, strict=True):
         one.add(terrain, plan, looks, tally)
+    return tallies
+
+
+def _trace_beside_bodies(
+    scene: Scene,
+    plans: Sequence[Plan],
+    beside: Sequence[BesideBodies],
+    spare: deque[Tally],
+    seeds: tuple[np.random.SeedSequence, ...],
+) -> list[Tally]:
+    """One realisation with bodies; `seeds` of the scene, its rays and the looks."""
+    heights, rays, looks = seeds
+    target = _realize(scene, plans[0], heights)
+    assert isinstance(target, WetField)
+    tallies = _trace_fixed(target, plans, spare, rays)
+    bodies = beside[0].on_plane(heights)
+    for plan, one, tally in zip(plans, beside, tallies, strict=True):
+        one.add(target, bodies, plan, (rays, looks), tally)
     return tallies

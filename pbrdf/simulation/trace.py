@@ -71,15 +71,10 @@ def trace_sample(
     zenith, azimuth = bin_edges(plan.n_theta, plan.n_dphi)
     record = np.empty((plan.max_bounces + 1, 1, shading.N_RECORD))
     waiting = np.empty((plan.max_bounces, N_WAITING))
-    shifts, streams = _drawn(plan, seed)
-    for index, theta in enumerate(plan.theta_i):
+    rays = drawn(plan, seed)
+    for index in range(len(plan.theta_i)):
         field = target if isinstance(target, Field | MeshField) else target.field
-        launch = field.entry_rectangle(theta, plan.phi_i, plan.half_angle)
-        source = Source(
-            np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
-            launch, field.entry_lines(launch, plan.n_rays, plan.half_angle), plan.n_rays,
-            shifts[index], streams[index], np.sin(plan.half_angle),
-        )  # fmt: skip
+        source = source_of(field, plan, index, rays)
         bins = shading.Tally(
             zenith, azimuth, tally.flux[index], tally.lit[index], tally.energy[index],
             tally.counts[index], np.zeros((4, 4)),
@@ -123,7 +118,7 @@ def trace_sample(
     return tally
 
 
-def _drawn(plan: Plan, seed: np.random.SeedSequence) -> tuple[np.ndarray, np.ndarray]:
+def drawn(plan: Plan, seed: np.random.SeedSequence) -> tuple[np.ndarray, np.ndarray]:
     """Shifts of the entry points and stream of random numbers of each direction."""
     rng = np.random.default_rng(seed)
     number, own = plan.n_streams, plan.own
@@ -133,6 +128,22 @@ def _drawn(plan: Plan, seed: np.random.SeedSequence) -> tuple[np.ndarray, np.nda
         # Drawn last, so that a narrow beam keeps its rays
         shifts = np.hstack([shifts, rng.random((number, 2))])
     return shifts[own], streams
+
+
+def source_of(
+    field: Field | MeshField,
+    plan: Plan,
+    index: int,
+    rays: tuple[np.ndarray, np.ndarray],
+) -> Source:
+    """Rays of one direction of a plan over a surface; `rays` is what `drawn` gave."""
+    theta, (shifts, streams) = plan.theta_i[index], rays
+    launch = field.entry_rectangle(theta, plan.phi_i, plan.half_angle)
+    return Source(
+        np.sin(theta), np.cos(theta), plan.phi_i or 0.0, plan.phi_i is None,
+        launch, field.entry_lines(launch, plan.n_rays, plan.half_angle), plan.n_rays,
+        shifts[index], streams[index], np.sin(plan.half_angle),
+    )  # fmt: skip
 
 
 def _room(plan: Plan, meetings: np.ndarray) -> Room:

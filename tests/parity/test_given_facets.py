@@ -9,7 +9,7 @@ from pbrdf.kernels import jit
 from pbrdf.kernels.sights.looks import facet_place, set_ray
 from pbrdf.kernels.sights.walk import N_OF_RAY, Mesh, Rays, lift_clear
 from pbrdf.simulation.plan import Plan
-from pbrdf.simulation.single_bounce import SingleBounce
+from pbrdf.simulation.singles.single_bounce import SingleBounce
 from pbrdf.simulation.trace import prepare
 
 # Uneven in every respect: steps, lengths, nodes (a block of 8 cells is cut off), slopes

@@ -150,7 +150,7 @@ class SingleBounce:
 
     def hidden(self) -> np.ndarray:
         """Return the share of a bin that Smith's rule hides (angles, n_theta, n_dphi)."""
-        cells = np.array([self._by_bin(one.cells) for one in self.directions])
+        cells = np.array([self.by_bin(one.cells) for one in self.directions])
         whole = cells[..., ALL]
         return np.divide(
             whole - cells[..., SEEN], whole, out=np.zeros_like(whole), where=whole > 0.0
@@ -180,7 +180,20 @@ class SingleBounce:
             f"{looks:.0f} looks a realisation and direction."
         ]
 
-    def _by_bin(self, values: np.ndarray) -> np.ndarray:
+    def known(self) -> np.ndarray:
+        """Return the share of rays into a bin by Smith's rule (angles, n_theta, n_dphi)."""
+        return np.array([self.by_bin(one.cells)[..., SEEN] for one in self.directions])
+
+    def seen_by_bin(
+        self, terrain: Terrain, plan: Plan, angle: int, stream: np.uint64
+    ) -> np.ndarray:
+        """Return the same share in a realisation, by looks (n_theta, n_dphi)."""
+        unit = self.directions[angle].cells[..., SEEN]
+        if not self.everything:
+            unit = unit * self._look(terrain, plan, angle, stream)
+        return self.by_bin(unit[..., None])[..., 0]
+
+    def by_bin(self, values: np.ndarray) -> np.ndarray:
         """Sum cells (cells, cells, ...) over those of each bin."""
         a, b = self.parts
         n_theta, n_dphi = values.shape[0] // a, values.shape[1] // b
@@ -207,11 +220,11 @@ class SingleBounce:
             else:
                 seen = self._look(terrain, plan, a, streams[a])
             for w, light in enumerate(one.light):
-                flux = self._by_bin(light * seen[..., None])
+                flux = self.by_bin(light * seen[..., None])
                 tally.flux[a, w, 0] = (plan.n_rays * flux).reshape(tally.flux.shape[3:])
             unit = one.cells[..., SEEN]
-            tally.lit[a, 0] = self._by_bin(unit[..., None])[..., 0] > 0.0
-            tally.single[a] = self._by_bin((unit * seen)[..., None])[..., 0]
+            tally.lit[a, 0] = self.by_bin(unit[..., None])[..., 0] > 0.0
+            tally.single[a] = self.by_bin((unit * seen)[..., None])[..., 0]
 
     def _look(
         self, terrain: Terrain, plan: Plan, angle: int, stream: np.uint64

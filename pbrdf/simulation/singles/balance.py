@@ -7,7 +7,7 @@ import numpy as np
 
 from pbrdf.kernels.paths.shading import ABSORBED, LEAKED, N_ORDERS, TRUNCATED
 from pbrdf.simulation.plan import Tally
-from pbrdf.simulation.single_bounce import SingleBounce
+from pbrdf.simulation.singles.single_bounce import SingleBounce
 
 
 class Balance:

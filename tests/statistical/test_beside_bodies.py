@@ -1,0 +1,131 @@
+"""Single bounces beside drops and spheres, corrected by the clean surface, against rays."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pbrdf import Drops, Film, GaussianSurface, Material, Scene, Spheres, simulate
+from pbrdf.simulation import simulate_parts
+
+GLASS, WATER = Material(1.5), Material(1.333)
+SURFACE = GaussianSurface(shape=(72, 72), spacing=1.0, corr_length=6.0, slope_rms=0.2)
+SMOOTH = GaussianSurface(shape=(96, 96), spacing=1.0, corr_length=8.0, slope_rms=0.05)
+# They throw long shadows, and are laid sooner than drops
+SPHERES = Spheres(radius=6.0, coverage=0.25, material=WATER)
+DROPS = Drops(contact_angle=1.2, coverage=0.2, number_density=6e-4, material=WATER)
+BINS = {"n_theta": 6, "n_dphi": 8}
+REDUCED = "single bounces beside bodies"
+
+
+def mirror_errors(run, theta_i):
+    """Stated errors of M00 relative to it, about the mirror direction."""
+    one = {"theta_i": 0, "stokes_out": 0, "stokes_in": 0}
+    near = np.abs(run.theta_s - theta_i) < 0.15
+    near = (near & (np.abs(run.dphi - np.pi) < 0.3)).values
+    light = run.brdf_total.isel(one).values[near]
+    return run.brdf_total_stderr.isel(one).values[near] / light
+
+
+@pytest.mark.parametrize("phi_i", [0.6, "uniform"])
+@pytest.mark.parametrize("wet", [SPHERES, DROPS], ids=["spheres", "drops"])
+def test_all_elements_of_all_bounces_agree_with_rays(phi_i, wet):
+    scene, theta_i = Scene(SURFACE, GLASS, wet), np.deg2rad([20.0, 60.0])
+    # More realisations of the plain estimator, from other seeds
+    reduced, plain = (
+        simulate(
+            scene, theta_i, phi_i=phi_i, n_rays=800, realizations=number, seed=seed,
+            variance_reduction=wanted, **BINS,
+        )
+        for number, seed, wanted in ((64, 1, True), (128, 2, False))
+    )  # fmt: skip
+    assert reduced.attrs["variance_reduction"] == REDUCED
+    assert plain.attrs["variance_reduction"] == "none"
+    for name in ("brdf", "brdf_total", "albedo"):
+        value, error = reduced[name].values, reduced[f"{name}_stderr"].values
+        other, spread = plain[name].values, plain[f"{name}_stderr"].values
+        light = other if name == "albedo" else other[..., :1, :1]
+        known = spread if name == "albedo" else spread[..., :1, :1]
+        lit = np.broadcast_to(light > 10 * known, value.shape) & (spread > 0)
+        z = (value - other)[lit] / np.hypot(error, spread)[lit]
+        assert np.abs(z).max() < 5
+        if name != "albedo":
+            assert z.size > 150
+            # Correlated bins: limits of a mean square of some hundred numbers
+            assert 0.6 < np.sqrt(np.mean(z**2)) < 1.3
+    budget = reduced.albedo.sum("bounces") + reduced.absorbed
+    budget += reduced.truncated + reduced.leaked
+    # Chance decides on the weakest parts of split rays
+    assert_allclose(budget, 1.0, atol=1e-4)
+
+
+@pytest.mark.parametrize("wet", [SPHERES, DROPS], ids=["spheres", "drops"])
+def test_there_is_less_noise_about_the_mirror_direction(wet):
+    plain, reduced = (
+        simulate(
+            Scene(SMOOTH, GLASS, wet), 0.7, n_rays=4000, realizations=16, seed=3,
+            variance_reduction=wanted, explain=True, n_theta=18, n_dphi=24,
+        )
+        for wanted in (False, True)
+    )  # fmt: skip
+    squares = [np.mean(mirror_errors(run, 0.7) ** 2) for run in (plain, reduced)]
+    assert squares[0] > 4 * squares[1]
+    told = ["noise of the slopes" in " ".join(run.explanation) for run in (plain, reduced)]
+    assert told == [False, True]
+    # The rays are the same: what takes more than one bounce is the same to the bit
+    assert (plain.brdf[1:] == reduced.brdf[1:]).all()
+
+
+def test_the_correction_is_nothing_in_the_mean():
+    """Of many seeds, bin by bin: what is added to the very same rays."""
+    scene = Scene(SURFACE, GLASS, SPHERES)
+    added = []
+    for seed in range(24):
+        plain, reduced = (
+            simulate(
+                scene, 0.9, n_rays=500, realizations=16, seed=seed, stokes="unpolarized",
+                variance_reduction=wanted, **BINS,
+            ).brdf_total.values.squeeze()
+            for wanted in (False, True)
+        )  # fmt: skip
+        added.append(reduced - plain)
+    mean, spread = np.mean(added, axis=0), np.std(added, axis=0, ddof=1)
+    touched = spread > 0.0
+    assert touched.sum() > 15
+    z = mean[touched] / spread[touched] * np.sqrt(len(added))
+    # Student's t of 23 degrees of freedom in 48 bins: 5 has a chance of 2e-3
+    assert np.abs(z).max() < 5.0
+    assert np.mean(z**2) < 2.0
+
+
+@pytest.mark.parametrize(
+    ("substrate", "wet"),
+    [
+        (Material.mirror(), SPHERES),
+        (GLASS, [SPHERES, Film(thickness=0.3, material=WATER)]),
+    ],
+    ids=["mirror", "film"],
+)
+def test_where_nothing_is_gained_rays_do_all(substrate, wet):
+    """A mirror keeps all light to the last digit; under a film no facet is clean."""
+    runs = [
+        simulate(
+            Scene(SURFACE, substrate, wet), 0.7, n_rays=200, realizations=8,
+            variance_reduction=wanted, **BINS,
+        )
+        for wanted in (False, True)
+    ]  # fmt: skip
+    assert [run.attrs["variance_reduction"] for run in runs] == ["none", "none"]
+    assert (runs[0].brdf == runs[1].brdf).all()
+
+
+def test_azimuths_workers_and_parts_do_not_change_a_bit():
+    scene, theta_i = Scene(SURFACE, GLASS, SPHERES), [0.3, 0.9]
+    options = {"n_rays": 300, "realizations": 8, "seed": 4, **BINS}
+    both = simulate(scene, theta_i, phi_i=[0.2, 1.1], workers=2, **options)
+    alone = simulate(scene, theta_i, phi_i=1.1, workers=1, **options)
+    assert alone.attrs["variance_reduction"] == REDUCED
+    assert (both.brdf.isel(phi_i=1) == alone.brdf).all()
+    parts = list(simulate_parts(scene, theta_i, phi_i=1.1, at_once=1, **options))
+    for k, part in enumerate(parts):
+        assert (part.brdf[:, 0] == alone.brdf[:, k]).all()
+        assert (part.brdf_stderr[:, 0] == alone.brdf_stderr[:, k]).all()
