@@ -129,7 +129,7 @@ def at_work(
     finished = size.result + 8 * size.unit / size.n_stokes**2
     surface = scene.surface
     drawn_anew = isinstance(surface, GaussianSurface) and not batched
-    if looks and clean and drawn_anew and not spectral:
+    if looks and drawn_anew and not spectral:
         sights = _sights(size)
         held += sights
         finished += sights + 6 * size.unit / size.n_stokes**2

@@ -122,7 +122,8 @@ def simulate(  # noqa: PLR0913  (the public signature)
         Gaussian surfaces at given wavelengths. Later bounces are those of the rays.
     variance_reduction : bool
         Take single bounces on a GaussianSurface from the known law of its slopes and from
-        looks at facets of given slopes, see the notes; False is the plain estimator.
+        looks at facets of given slopes, or beside drops and spheres the noise of the slopes
+        off them, see the notes; False is the plain estimator.
 
     Returns
     -------
@@ -155,6 +156,9 @@ def simulate(  # noqa: PLR0913  (the public signature)
     sampled, by facets of given slopes put at random places of the realisations. Their share
     of the noise falls by one to three orders of magnitude; where no facet hides another
     nothing is left of it. Rays give the other bounces, scaled so that no light is lost.
+
+    Beside drops and spheres on a GaussianSurface single bounces come from the rays, less
+    what the same rays over the clean surface tell of the noise of its slopes.
 
     Examples
     --------
