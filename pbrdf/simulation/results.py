@@ -32,7 +32,7 @@ from pbrdf.scene.write import scene_text
 from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.samples import Ready, Singles
-from pbrdf.simulation.singles.beside_bodies import BesideBodies
+from pbrdf.simulation.singles.wet import BesideBodies
 from pbrdf.simulation.skips import explanation, mesh_explanation
 from pbrdf.simulation.waves import join_waves
 from pbrdf.surface import HeightMap, MeshSurface

@@ -18,8 +18,8 @@ from pbrdf.simulation.pilot import choose
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.results import judged_before, labelled
 from pbrdf.simulation.samples import Ready, Singles, trace_samples
-from pbrdf.simulation.singles.beside_bodies import beside_bodies
 from pbrdf.simulation.singles.single_bounce import without_rays
+from pbrdf.simulation.singles.wet import beside_bodies
 from pbrdf.simulation.skips import chosen_skips
 from pbrdf.simulation.waves import check_waves
 from pbrdf.surface import MeshSurface

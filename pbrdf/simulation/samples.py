@@ -12,8 +12,8 @@ import numpy as np
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.plan import Plan, Tally
-from pbrdf.simulation.singles.beside_bodies import BesideBodies
 from pbrdf.simulation.singles.single_bounce import SingleBounce
+from pbrdf.simulation.singles.wet import BesideBodies
 from pbrdf.simulation.trace import Target, prepare, trace_sample
 from pbrdf.surface import FixedSurface, HeightMap, MeshSurface
 from pbrdf.tracer import arguments
