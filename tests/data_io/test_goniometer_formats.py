@@ -103,6 +103,18 @@ def test_fred_sources_at_several_azimuths_stay_apart(tmp_path):
     assert_allclose(scan.M00, [0.5, 0.4, 0.3, 1.0])
 
 
+def test_fred_row_without_its_value_is_not_taken_for_a_source_in_silence(tmp_path):
+    rows = [f"{theta} {phi} 0.1" for phi in (180, 0) for theta in range(0, 60, 10)]
+    head = "type bsdf_data\nformat angles=deg bsdf=value\n30 0\n"
+    broken = [*rows[:8], "20 0", *rows[9:]]
+    path = tmp_path / "broken.txt"
+    path.write_text(head + "\n".join(broken))
+    with pytest.warns(ConventionWarning, match=r"broken.txt line 12: .* lost its value"):
+        read_goniometer(path)
+    path.write_text(head + "\n".join([*rows, "50 0", *rows[:5]]))
+    assert read_goniometer(path).sizes["geometry"] == 17
+
+
 def test_fred_in_radians(tmp_path):
     text = "type bsdf_data\nformat angles=rad bsdf=value\n0.5 0\n0.2 0 0.25\n0.3 3.14159265 1\n"
     scan = read_goniometer(write(tmp_path, text))

@@ -2,7 +2,9 @@
 
 import pytest
 
-from tests.fuzz.run import READERS, run
+from tests.fuzz.good_files import READERS
+from tests.fuzz.kept import check
+from tests.fuzz.run import run
 
 
 @pytest.mark.parametrize("name", READERS)
@@ -10,3 +12,14 @@ def test_damaged_files_are_refused_by_name(name):
     tally, faults = run(name, 60, seed=7)
     assert not faults, tally
     assert tally.get("refused", 0) > 5
+
+
+@pytest.mark.parametrize("name", ["goniometer", "fred", "table-utf16", "astm", "wide"])
+def test_values_in_another_place_are_noticed(name, tmp_path):
+    make, suffix, read = READERS[name]
+    path = tmp_path / f"file{suffix}"
+    path.write_bytes(make())
+    scan = read(path)
+    assert check(scan, path) is None
+    assert "stands on no line" in check(scan.assign(M00=scan.M00[::-1]), path)
+    assert "stands on no line" in check(scan.assign(M00=scan.M00 * 10.0), path)

@@ -8,12 +8,14 @@ the file's.
 """
 
 import re
+import warnings
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from data_io.goniometer.declarations import Declared
-from data_io.goniometer.scan import Scan
+from data_io.goniometer.scan import ConventionWarning, Scan
 from data_io.goniometer.tables.angles import relative_azimuth
 from data_io.text.text import Line, is_number, without_comments
 from pbrdf.errors import DataFileError
@@ -36,6 +38,7 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     options = {"angles": "deg", "bsdf": "value", "scale": "1"}
     rows: list[tuple[float, ...]] = []
     numbers: list[int] = []
+    heads: list[int] = []
     incident: tuple[float, float] | None = None
     for line in content[1:]:
         cells = line.text.split()
@@ -45,6 +48,7 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
         row = _row(path, line, cells)
         if len(row) == 2:
             incident = row[0], row[1]
+            heads.append(line.number)
         elif incident is None:
             problem = "expected a line 'theta_i phi_i' before the first row, found none"
             cure = "The file is damaged; each block starts with its incident direction."
@@ -55,6 +59,7 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     if not rows:
         problem = "expected rows 'theta_s phi_s brdf', found none"
         raise DataFileError(path, problem, "The file is truncated.")
+    _warn_of_broken_blocks(path, heads, numbers, rows)
     theta_i, phi_i, theta_s, phi_s, brdf = np.array(rows).T
     angles = [theta_i, phi_i, theta_s, phi_s]
     if options["angles"] == "rad":
@@ -72,6 +77,26 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
         names={"dphi": "phi_s", "M00": "brdf"},
         attrs={"format": "fred", "title": path.stem},
     )
+
+
+def _warn_of_broken_blocks(
+    path: Path, heads: list[int], lines: list[int], rows: list[tuple[float, ...]]
+) -> None:
+    """Warn where a row that lost its value seems to count as the head of a block.
+
+    It stands halfway between its neighbours, and the halves of its block share nothing.
+    """
+    ends = np.searchsorted(lines, [*heads, np.inf])
+    blocks = [rows[a:b] for a, b in pairwise(ends.tolist())]
+    for head, one, other in zip(heads[1:], blocks[:-1], blocks[1:], strict=True):
+        if not one or not other or {r[2:4] for r in one} & {r[2:4] for r in other}:
+            continue
+        if np.allclose(np.add(one[-1][2:4], other[0][2:4]), np.multiply(2, other[0][:2])):
+            msg = (
+                f"{path.name} line {head}: two numbers begin a block of a new source, but "
+                "these continue the directions above: a row seems to have lost its value."
+            )
+            warnings.warn(msg, ConventionWarning, stacklevel=4)
 
 
 def _row(path: Path, line: Line, cells: list[str]) -> tuple[float, ...]:
