@@ -15,6 +15,9 @@ __all__ = ["check_polarisation"]
 
 # Standard errors that are beyond noise
 _FAR = 5.0
+# About the specular direction [deg], and Q/I there that noise and light from below a rough
+# interface do not reach
+_LOBE, _ALONG_P = 10.0, 0.1
 
 
 def check_polarisation(scan: "xr.Dataset") -> list[Finding]:
@@ -55,7 +58,37 @@ def check_polarisation(scan: "xr.Dataset") -> list[Finding]:
                     "--accept polarisation.",
                 )
             )  # fmt: skip
-    return findings + _biased_dolp(scan)
+    return findings + _along_p(scan) + _biased_dolp(scan)
+
+
+def _along_p(scan: "xr.Dataset") -> list[Finding]:
+    """Say that the lobe is polarised along p, as no facet leaves it: R_s >= R_p."""
+    found = brightness(scan)
+    if "m10" in scan:
+        degree = np.asarray(scan["m10"].values, float)
+    elif "M10" in scan and found is not None:
+        degree = np.asarray(scan["M10"].values, float) / np.where(found[0] > 0, found[0], 1)
+    elif {"I_s", "I_p"} <= set(scan.data_vars) and found is not None:
+        difference = np.asarray((scan["I_s"] - scan["I_p"]).values, float)
+        degree = difference / np.where(found[0] > 0.0, found[0], 1.0)
+    else:
+        return []
+    theta_i, theta_s = (np.degrees(scan[name].values) for name in ("theta_i", "theta_s"))
+    lobe = np.abs(theta_s - theta_i) < _LOBE
+    lobe &= np.abs(np.cos(scan["dphi"].values) + 1.0) < 1e-6
+    lobe &= (theta_i > 25.0) & (theta_i < 65.0) & np.isfinite(degree)
+    if lobe.sum() < 3 or not (middle := float(np.median(degree[lobe]))) < -_ALONG_P:
+        return []
+    return [
+        Finding(
+            name="s-and-p", severity="warning",
+            what=f"the {lobe.sum()} readings within {_LOBE:g} degrees of the specular "
+            f"direction have a median Q/I of {middle:.2g}: polarised along p, where a "
+            "surface reflects more of s",
+            suspects="s and p exchanged, or Q of the other sign",
+            cure="Exchange the columns, --columns I_s=I_p,I_p=I_s, or the sign of M10.",
+        )
+    ]  # fmt: skip
 
 
 def _errors_of(

@@ -19,11 +19,7 @@ _REPEATS = 3
 def check_limits(curves: Sequence[Curve]) -> list[Finding]:
     """Look for a ceiling and a floor: the same extreme number several times."""
     findings = []
-    ceilings = [
-        curve
-        for curve in curves
-        if _repeated(curve, np.max) and curve.value.max() > 1.2 * np.median(curve.value)
-    ]
+    ceilings = [curve for curve in curves if _is_clipped(curve)]
     if ceilings:
         curve = ceilings[0]
         findings.append(
@@ -64,6 +60,16 @@ def check_limits(curves: Sequence[Curve]) -> list[Finding]:
             )
         )  # fmt: skip
     return findings
+
+
+def _is_clipped(curve: Curve) -> bool:
+    """Tell whether a curve ends in a ceiling, and is not flat or coarsely rounded."""
+    count, top = _repeated(curve, np.max), float(curve.value.max(initial=0.0))
+    middle = float(np.median(curve.value)) if count else 0.0
+    if not count or not top > 1.05 * min(middle, float(curve.value.mean())):
+        return False
+    _, others = np.unique(curve.value[curve.value < top], return_counts=True)
+    return top > 1.2 * middle or count >= _REPEATS * int(others.max(initial=1))
 
 
 def _repeated(curve: Curve, extreme: Callable[[np.ndarray], float]) -> int:
@@ -142,12 +148,22 @@ def check_wavelengths(scan: "xr.Dataset") -> list[Finding]:
                     cure="Each has an albedo of its own; --wavelength-um takes one.",
                 )
             )  # fmt: skip
-    if scan.attrs.get("quantity") == "relative" or brightness(scan) is None:
+    found = brightness(scan)
+    if scan.attrs.get("quantity") == "relative" or found is None:
         findings.append(
             Finding(
                 name="scale", severity="note",
                 what="the readings have no absolute scale: no albedo or gain follows from "
                 "them, but ratios",
+            )
+        )  # fmt: skip
+    elif np.nanmax(found[0], initial=0.0) in (1.0, 100.0) and np.ptp(found[0]) > 0.0:
+        findings.append(
+            Finding(
+                name="scale", severity="warning",
+                what=f"the brightest reading is exactly {np.nanmax(found[0]):g}",
+                suspects="a scan divided by its peak, which tells no gain or albedo",
+                cure="Give --quantity relative.",
             )
         )  # fmt: skip
     stated, own = scan.attrs.get("tis"), scan.attrs.get("tis_of_table")

@@ -16,6 +16,7 @@ from fitting.problem.gauge import Gauge
 from fitting.problem.problem import Problem, Solved
 from fitting.readings.observations import Geometry, Observations
 from fitting.result.fit_result import HARDLY_APART
+from fitting.result.runs import running_together
 
 __all__ = ["identifiability_warnings", "misfit_warnings"]
 
@@ -163,12 +164,16 @@ def misfit_warnings(problem: Problem, solved: Solved, p_value: float) -> list[st
         warnings.append(
             f"chi2/dof is {ratio:.3g}: the stated errors are larger than the scatter"
         )
-    # Independent residuals have a lag-one correlation of 0 +- 1/sqrt(count)
-    running = [
-        f"{name} ({correlation:.2f})"
-        for name, correlation, count in _runs(problem.observations, residual)
-        if count >= 12 and correlation > max(0.4, 4.0 / np.sqrt(count))
-    ]
+    geometry, at = problem.observations.geometry, problem.observations.at
+    columns = {
+        "observable": problem.observations.name,
+        "scan": problem.observations.scan[at],
+        "residual": residual,
+        "theta_view": geometry.theta_view[at],
+        "theta_i": geometry.theta_i[at],
+        "wavelength": geometry.wavelength[at],
+    }
+    running = [f"{name} ({size:.2f})" for name, size in running_together(columns)]
     if running:
         warnings.append(
             f"the residuals of {_listed(running)} run together along the scan (correlation "
@@ -291,31 +296,6 @@ def _unpolarised(problem: Problem, solved: Solved, found: Information) -> str:
     if gains:
         text += f". M10 measured as well would {_listed(gains)}"
     return text
-
-
-def _runs(observations: Observations, residual: np.ndarray) -> list[tuple[str, float, int]]:
-    """Return the lag-one correlation of residuals along the scans, by observable."""
-    geometry = observations.geometry
-    view = geometry.theta_view[observations.at]
-    incidence = geometry.theta_i[observations.at].round(6)
-    wavelength = np.nan_to_num(geometry.wavelength[observations.at])
-    scan = observations.scan[observations.at]
-    found = []
-    for name in observations.names:
-        above = below = 0.0
-        count = 0
-        members = np.flatnonzero((observations.name == name) & np.isfinite(view))
-        keys = np.stack([scan[members], incidence[members], wavelength[members]], axis=1)
-        for key in np.unique(keys, axis=0):
-            one = members[(keys == key).all(axis=1)]
-            one = one[np.argsort(view[one])]
-            along = residual[one]
-            above += float(along[1:] @ along[:-1])
-            below += float(along @ along)
-            count += len(one)
-        if below > 0.0:
-            found.append((name, above / below, count))
-    return found
 
 
 def _listed(words: Sequence[str]) -> str:

@@ -6,13 +6,14 @@ measured and fitted below three standard errors, has no deviation that means any
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import stats
 
 from fitting.readings.observations import LINEAR, NORMALISED
+from fitting.result.runs import running_together
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,11 +24,17 @@ __all__ = ["RULE", "VERDICTS", "Misfit", "Reading", "misfit_of"]
 VERDICTS = ("good", "fair", "poor")
 # Largest deviation of half of the readings, and of 19 in 20 and of the brightest
 _LIMITS = {"good": (0.05, 0.25), "fair": (0.20, 1.0)}
+# Deviations that run together shift the parameters as far: less of them is good
+_RUNNING = (0.01, 0.05)
 _CHANCE = 0.001
+# Beyond so many stated errors rms no interval of a parameter is worth its name
+_BEYOND = 3.0
 RULE = (
     "good: the errors given explain the misfit (p >= 0.001), or none were given and half "
-    "of the readings lie within 5 % of the curve, 19 in 20 and the brightest within 25 %; "
-    "fair: half within 20 %, 19 in 20 and the brightest within a factor of 2; poor: else"
+    "of the readings lie within 5 % of the curve, 19 in 20 and the brightest within 25 % "
+    "(1 % and 5 % where neighbours deviate together); fair: half within 20 %, 19 in 20 "
+    "and the brightest within a factor of 2, and within 3 of the errors given rms; "
+    "poor: else"
 )
 _HIDDEN = 3.0
 # Scans and wavelengths that a summary lists
@@ -249,15 +256,15 @@ def misfit_of(
     members = list(_members(columns["scan"], waves))
     judged = []
     for chosen in members:
-        chance = None
+        one = _judged(columns, deviation, counts, chosen)
         if stated:
             chi2 = float(np.square(columns["residual"][chosen]).sum())
-            chance = float(stats.chi2.sf(chi2, max(share * chosen.size, 1.0)))
+            freedom = max(share * chosen.size, 1.0)
             # One of many groups is bound to look unlikely
-            chance *= len(members)
-        judged.append(_judged(columns, deviation, counts, chosen, chance))
-    everything = np.arange(len(deviation))
-    whole = _judged(columns, deviation, counts, everything, None)
+            chance = float(stats.chi2.sf(chi2, freedom)) * len(members)
+            one = replace(one, verdict=_beside_errors(one, chance, chi2 / freedom))
+        judged.append(one)
+    whole = _judged(columns, deviation, counts, np.arange(len(deviation)))
     verdict = max((one.verdict for one in judged), key=VERDICTS.index)
     groups = tuple(
         (str(columns["scan"][chosen[0]]), float(columns["wavelength"][chosen[0]]), one)
@@ -297,9 +304,8 @@ def _judged(
     deviation: np.ndarray,
     counts: np.ndarray,
     chosen: np.ndarray,
-    chance: float | None,
 ) -> Misfit:
-    """Return the misfit of some readings; `chance` is nan-free p, None if noise is open."""
+    """Return the misfit of some readings, with the verdict on its size."""
     bright = chosen[np.isin(columns["observable"][chosen], _INTENSITIES)]
     peaks = [
         int(bright[np.argmax(columns[key][bright])])
@@ -313,13 +319,11 @@ def _judged(
     median, most = float(np.median(size)), float(np.quantile(size, 0.95))
     brightest = max((abs(float(deviation[peak])) for peak in peaks), default=0.0)
     verdict = "poor"
+    running = running_together({key: column[chosen] for key, column in columns.items()})
     for word in reversed(VERDICTS[:2]):
-        half, rest = _LIMITS[word]
+        half, rest = _RUNNING if word == "good" and running else _LIMITS[word]
         if median <= np.log1p(half) and max(most, brightest) <= np.log1p(rest):
             verdict = word
-    if chance is not None:
-        explained = chance >= _CHANCE
-        verdict = "good" if explained else max(verdict, "fair", key=VERDICTS.index)
     at = int(seen[np.argmax(size)])
     residual = columns["residual"][chosen]
     return Misfit(
@@ -333,6 +337,15 @@ def _judged(
         worst_stderr=float(np.abs(residual).max()),
         count=len(chosen),
     )
+
+
+def _beside_errors(one: Misfit, chance: float, ratio: float) -> str:
+    """Return the verdict where errors were given: p and chi2 a degree of freedom."""
+    if chance >= _CHANCE:
+        return "good"
+    if ratio > _BEYOND**2:
+        return "poor"
+    return max(one.verdict, "fair", key=VERDICTS.index)
 
 
 def _number(value: float) -> float | None:

@@ -359,6 +359,41 @@ def test_elements_that_may_be_counted_from_one_are_refused(tmp_path, header, row
         assert cure in str(caught.value)
 
 
+def test_ratios_that_may_be_counted_from_one_are_refused(tmp_path):
+    (tmp_path / "s.csv").write_text(f"{HEAD},m12,m22,m33\n30,20,0.1,0.9,0.8\n")
+    with pytest.raises(DataFileError, match=r"counted from 1, m12 is M01/M00") as caught:
+        read_goniometer(tmp_path / "s.csv")
+    assert "Counted from 1: --columns m12=m01,m22=m11,m33=m22." in str(caught.value)
+    said = {"m12": "m01", "m22": "m11", "m33": "m22"}
+    scan = read_goniometer(tmp_path / "s.csv", columns=said)
+    assert float(scan.m01[0]) == 0.1
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "good"),
+    [
+        ("M00,M00_stderr [%]", "0.3,2", False),
+        ("DOLP [%],DOLP_stderr", "30,0.02", False),
+        ("DOLP [%],DOLP_stderr [%]", "30,2", True),
+    ],
+)
+def test_a_standard_error_has_the_unit_of_its_value(tmp_path, header, row, good):
+    path = tmp_path / "s.csv"
+    path.write_text(f"{HEAD},{header}\n30,20,{row}\n")
+    if good:
+        assert float(read_goniometer(path).DOLP_stderr[0]) == 0.02
+        return
+    with pytest.raises(DataFileError, match=r"standard error in the unit of .* no unit"):
+        read_goniometer(path)
+
+
+def test_an_infinite_angle_is_refused(tmp_path):
+    path = tmp_path / "s.csv"
+    path.write_text("theta_i_deg,theta_s_deg,dphi_deg,M00\n30,20,1e400,0.1\n")
+    with pytest.raises(DataFileError, match=r"column dphi_deg: .* in every row, got inf"):
+        read_goniometer(path)
+
+
 def test_elements_counted_from_one_are_read_as_declared(tmp_path):
     (tmp_path / "s.csv").write_text(f"{HEAD},M11,M12\n30,20,0.3,0.1\n30,25,0.2,0.1\n")
     scan = read_goniometer(tmp_path / "s.csv", columns={"M11": "M00", "M12": "M01"})

@@ -162,12 +162,40 @@ def test_a_cosine_breaks_reciprocity_as_itself():
     assert "--quantity brdf-cos" in error.cure
 
 
+@pytest.mark.parametrize("index", [Material(1.5), Material(1.4, 7.6)])
+def test_a_lobe_polarised_along_p_is_doubted(index):
+    scan = scan_of(MODEL.with_parameters(material=index))
+    assert "s-and-p" not in names(scan)
+    half = {"I_s": (scan.M00 + scan.M10) / 2.0, "I_p": (scan.M00 - scan.M10) / 2.0}
+    ratio = scan.drop_vars("M10").assign(m10=-scan.M10 / scan.M00)
+    swapped = scan.drop_vars(["M00", "M10"]).assign(I_s=half["I_p"], I_p=half["I_s"])
+    # A metal hardly polarises: it cannot be told
+    expected = index.kappa == 0.0
+    for turned in (scan.assign(M10=-scan.M10), ratio, swapped):
+        assert ("s-and-p" in names(turned)) == expected
+    assert "s-and-p" not in names(swapped.assign(**half))
+
+
+def test_a_scan_divided_by_its_peak_is_doubted():
+    scan = scan_of()
+    peak = scan / scan.M00.max()
+    assert "scale" in names(peak, ("warning",)) - names(scan, ("warning",))
+    assert "scale" not in names(peak.assign_attrs(quantity="relative"), ("warning",))
+
+
 def test_limits_of_the_instrument_repeats_and_noise():
     scan = scan_of(
         MicrofacetModel(Material(1.5), slope_rms=0.15), views=np.arange(-75, 76, 2.5)
     )
     clipped = scan.assign(M00=scan.M00.clip(max=0.7 * float(scan.M00.max())))
     assert "saturation" in names(clipped) - names(scan)
+    # A diffuse sample, of which the ceiling takes almost half
+    diffuse = scan_of()
+    clipped = diffuse.assign(M00=diffuse.M00.clip(max=1.18 * float(diffuse.M00.median())))
+    assert "saturation" in names(clipped) - names(diffuse)
+    # Neither is what was rounded to two digits, nor a curve without a peak
+    for level in (diffuse.M00.round(2), 0.0 * diffuse.M00 + 0.3):
+        assert "saturation" not in names(diffuse.assign(M00=level, M10=0.0 * level))
     floored = scan.assign(M00=scan.M00.clip(min=0.02 * float(scan.M00.max())))
     assert "floor" in names(floored)
     assert "duplicates" in names(xr.concat([scan, scan], "geometry")) - names(scan)

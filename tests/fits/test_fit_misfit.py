@@ -65,12 +65,29 @@ def test_the_rule_is_by_size_where_the_noise_is_open():
 
 
 def test_stated_errors_decide_before_size():
-    # 15 % scatter that was announced is no misfit; 2 % that was not is none to be silent of
+    # 15 % scatter that was announced is no misfit
     rough = scan(VINYL, noise=0.15, seed=2)
     assert fit(rough, VINYL).misfit.verdict == "good"
-    tight = fit(scan(VINYL, noise=0.02, seed=2), VINYL, noise=Noise(relative=0.001))
-    assert tight.misfit.verdict == "fair"
-    assert tight.misfit.worst_stderr > 10.0
+    # Where twice the errors would do the numbers still tell something; where 20 times, not
+    read = scan(VINYL, noise=0.02, seed=2)
+    words = [fit(read, VINYL, noise=Noise(relative=part)).misfit.verdict
+             for part in (0.02, 0.01, 0.001)]  # fmt: skip
+    assert words == ["good", "fair", "poor"]
+
+
+def test_a_wrong_slope_is_not_good_whether_or_not_the_noise_is_stated():
+    wrong = VINYL.with_parameters(slope_rms=0.30)
+    for noise, size in ((0.02, "fair"), (0.005, "poor")):
+        stated = fit(scan(VINYL, noise=noise, seed=2), wrong)
+        # It drives the gain many of its standard errors away
+        miss = stated.values["specular_gain"] - VINYL.specular_gain
+        assert miss > 15.0 * stated.stderr["specular_gain"]
+        assert stated.misfit.verdict == size
+    open_ = fit(scan(VINYL, noise=0.005, seed=2, stderr=False), wrong, noise="relative")
+    assert open_.misfit.median < 0.05
+    assert open_.misfit.verdict == "fair"
+    free = fit(scan(VINYL, noise=0.005, seed=2, stderr=False), wrong, FREE)
+    assert free.misfit.verdict == "good"
 
 
 def test_readings_that_noise_hides_do_not_count_as_factors():

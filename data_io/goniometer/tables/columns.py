@@ -38,7 +38,7 @@ _SUGGESTED = tuple(t for t in TARGETS if t.startswith(("theta", "wavelength", "s
 _ERROR_WORDS = re.compile(
     r"^u\((.+)\)$|^(.*?)[\s_-]*(?:err|error|unc|uncertainty|sigma|std)$"
 )
-_FROM_ONE = re.compile(r"^m(?:4[1-4]|[1-3]4)$", re.IGNORECASE)
+_FROM_ONE = re.compile(r"^m(?:4[1-4]|[1-3]4|[1-4]{2}/m11)$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -130,12 +130,30 @@ def _meanings(path: Path, table: RawTable, declared: Declared) -> list[Meaning]:
         found.append(meaning or Meaning(IGNORE))
     if unknown or without_unit:
         raise _unknown(path, table, unknown, without_unit)
+    _require_one_unit(path, table, found)
     if text:
         msg = (
             f"{path.name}: columns of text are left out: {shortened(', '.join(text), 200)}."
         )
         warnings.warn(msg, ConventionWarning, stacklevel=5)
     return found
+
+
+def _require_one_unit(path: Path, table: RawTable, meanings: list[Meaning]) -> None:
+    """Refuse a standard error in per cent of what is not, or the other way round."""
+    units = {(m.name, m.wavelength): m.unit for m in meanings if not m.stderr}
+    for name, meaning in zip(table.names, meanings, strict=True):
+        key = meaning.name, meaning.wavelength
+        if not meaning.stderr or "%" not in (meaning.unit, units.get(key)):
+            continue
+        if key in units and units[key] != meaning.unit:
+            problem = f"expected a standard error in the unit of {meaning.name}"
+            cure = (
+                "A part of each reading is no unit: write the error itself, or leave the "
+                f"column out (--columns {_without_unit_row(name)}=ignore) and let the fit "
+                "estimate the noise."
+            )
+            raise DataFileError(path, problem, cure, line=table.header, column=name)
 
 
 def _check_mapping(path: Path, table: RawTable, declared: Declared) -> None:
@@ -228,9 +246,11 @@ def _require_full(
     """Refuse gaps where every row needs a number."""
     full = dict(angles) | ({} if waves is None else {"wavelength": waves})
     for key, numbers in full.items():
-        if numbers.isna().any():
-            row = int(numbers.isna().to_numpy().argmax())
-            problem = "expected a number in every row, got an empty cell or nan"
+        gaps = ~np.isfinite(numbers.to_numpy())
+        if gaps.any():
+            row = int(gaps.argmax())
+            got = "an empty cell or nan" if np.isnan(numbers.iloc[row]) else "inf"
+            problem = f"expected a number in every row, got {got}"
             cure = "Only measured values may be left empty."
             raise DataFileError(
                 path, problem, cure, line=table.lines[row], column=names[key]

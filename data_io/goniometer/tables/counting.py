@@ -32,8 +32,9 @@ def require_counted_from_zero(
     Raises
     ------
     DataFileError
-        If M11 (or m11) is there, no element has an index 0 and nothing else holds the
-        reflectance; or if `--columns` gives some elements another number and not others.
+        If M11 is there, or elements divided by M00 alone, no element has an index 0 and
+        nothing else holds the reflectance; or if `--columns` gives some elements another
+        number and not others.
     """
     if any(text in NOTES for text in comments):
         return
@@ -57,11 +58,15 @@ def require_counted_from_zero(
         raise DataFileError(path, problem, _cure(left), line=line)
     # M11/M00 says itself that there is an M00
     counted = [key for key, name in left.items() if "0" in key[1:3] or "00" in name]
-    if counted or _INTENSITY & set(values) or not {"M11", "m11"} & left.keys():
+    ratios = bool(left) and all(key.startswith("m") for key in left)
+    if counted or _INTENSITY & set(values) or not ("M11" in left or ratios):
         return
+    example = (
+        "m12 is M01/M00" if ratios and "m11" not in left else "M11 is the reflectance M00"
+    )
     problem = (
         f"expected M00 or another element with an index 0, got {', '.join(left.values())}: "
-        "counted from 1, M11 is the reflectance M00"
+        f"counted from 1, {example}"
     )
     raise DataFileError(path, problem, _cure(left), line=line)
 
