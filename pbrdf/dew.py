@@ -10,7 +10,7 @@ import xarray as xr
 
 from pbrdf.contaminants import Drops
 from pbrdf.conventions import direction
-from pbrdf.errors import AccuracyWarning, check_seed, require
+from pbrdf.errors import AccuracyWarning, check_seed, require, told_once
 from pbrdf.optics.materials import Material
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.memory import CURE, asked_size, at_work
@@ -107,7 +107,8 @@ def compare_dew(  # noqa: PLR0913  (a scene, an amount and a run)
             if progress is not None:
                 progress(number * runs + run + 1, len(scenes) * runs)
         results.append(_over_runs(repeats))
-    for note in notes:
+    told = told_once(notes)
+    for note in told:
         warnings.warn(note, AccuracyWarning, stacklevel=2)
     whole = xr.concat(
         results, xr.DataArray(states, dims="state", name="state"),
@@ -125,7 +126,7 @@ def compare_dew(  # noqa: PLR0913  (a scene, an amount and a run)
     whole["brdf_stderr"] = stderr.transpose(*whole.brdf.dims)
     # Drops are laid anew in every run, and the azimuth is averaged over
     whole.attrs["isotropic"] = isotropic(surface)
-    whole.attrs |= {"warnings": list(notes), "runs": runs, "seed": seed}
+    whole.attrs |= {"warnings": told, "runs": runs, "seed": seed}
     return whole.drop_vars(["brdf_runs", "one_path"])
 
 

@@ -1,11 +1,14 @@
 """Errors that name the quantity, the rule, the value, the place and the cure."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+_NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
 def shortened(text: str, most: int) -> str:
@@ -20,6 +23,28 @@ def shortened(text: str, most: int) -> str:
         return text
     tail = (most - 5) // 4
     return f"{text[: most - 5 - tail]} ... {text[-tail:]}"
+
+
+def told_once(notes: Iterable[str]) -> list[str]:
+    """Return notes that differ in their numbers alone once, and how many more there were.
+
+    Examples
+    --------
+    >>> told_once(["lost 2 rays", "lost 0.3 rays", "dark", "lost 2 rays"])
+    ['lost 2 rays (and 1 more with other numbers)', 'dark']
+    """
+    return [
+        f"{first} (and {len(others)} more with other numbers)" if others else first
+        for first, *others in of_kind(notes)
+    ]
+
+
+def of_kind(notes: Iterable[str]) -> list[list[str]]:
+    """Put notes that differ in their numbers alone together, each once."""
+    found: dict[str, list[str]] = {}
+    for note in dict.fromkeys(notes):
+        found.setdefault(_NUMBER.sub("#", note), []).append(note)
+    return list(found.values())
 
 
 class DataFileError(ValueError):

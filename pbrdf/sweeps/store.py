@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from filelock import FileLock
 
+from pbrdf.errors import of_kind
 from pbrdf.files import complete_file, complete_folder
 from pbrdf.files.writing import ExistsError
 from pbrdf.sweeps.description import Sweep
@@ -139,11 +140,16 @@ class Store:
 
 
 def said(warnings: Mapping[str, int]) -> list[str]:
-    """Write warnings and at how many points they were said, in one order."""
-    return [
-        f"{text} ({count} run{'s' * (count > 1)})"
-        for text, count in sorted(warnings.items())
-    ]
+    """Write warnings and at how many points they were said, in one order.
+
+    Of those that differ in their numbers alone the first stands for all.
+    """
+    lines = []
+    for first, *others in of_kind(sorted(warnings)):
+        count = warnings[first] + sum(warnings[one] for one in others)
+        numbers = ", with other numbers in some" if others else ""
+        lines.append(f"{first} ({count} run{'s' * (count > 1)}{numbers})")
+    return lines
 
 
 def digest(block: dict[str, np.ndarray]) -> str:

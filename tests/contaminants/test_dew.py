@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from pbrdf import GaussianSurface, HeightMap, Material
 from pbrdf.cli import main
 from pbrdf.dew import compare_dew, jackknife
+from pbrdf.errors import AccuracyWarning
 
 PAINT, WATER = Material(1.5), Material(1.333)
 SURFACE = GaussianSurface(shape=(64, 64), spacing=2.0, corr_length=30.0, slope_rms=0.05)
@@ -131,3 +132,17 @@ def test_the_command_writes_its_folder(tmp_path, capsys):
     assert {row["state"] for row in table} == {"dry", "90 deg"}
     assert float(table[0]["M00"]) > 10 * float(table[0]["M00_stderr"]) > 0
     assert "hemisphere" in capsys.readouterr().out
+
+
+def test_a_warning_that_differs_in_its_numbers_is_told_once():
+    """Each contact angle has drops of a radius of its own, all too small for 10 um."""
+    with pytest.warns(AccuracyWarning) as caught:
+        result = compare_dew(
+            SURFACE, "pvc", np.deg2rad([30.0, 60.0, 90.0]), 0.3,
+            amount={"volume_per_area": 0.01, "number_density": 0.04}, runs=2, n_rays=320,
+            n_theta=6, n_dphi=8, wavelength=10.0,
+        )  # fmt: skip
+    told = [str(one.message) for one in caught if "median radius" in str(one.message)]
+    assert len(told) == 1
+    assert told[0].endswith("(and 2 more with other numbers)")
+    assert told[0] in result.attrs["warnings"]

@@ -225,10 +225,13 @@ def _tell(report: "Report") -> None:
         )
     if talk() is Talk.QUIET:
         return
-    for text, count in report.warnings.most_common(TOLD):
-        typer.echo(f"warning: in {count} of the runs: {text}", err=True)
-    if len(report.warnings) > TOLD:
-        more = len(report.warnings) - TOLD
+    from pbrdf.sweeps.store import said
+
+    lines = said(report.warnings)
+    for line in lines[:TOLD]:
+        typer.echo(f"warning: {line}", err=True)
+    if len(lines) > TOLD:
+        more = len(lines) - TOLD
         typer.echo(f"warning: and {more} other kinds, see the marks of the store", err=True)
 
 
