@@ -283,6 +283,9 @@ class FitResult:
 
         return fit_figure(self.readings)
 
+    def __str__(self) -> str:
+        return self.summary()
+
     def summary(self) -> str:
         """Return the result as a few lines of text."""
         width = max(len(name) for name in self.values)

@@ -311,6 +311,10 @@ Output = Annotated[
     Path | None,
     typer.Option("--output", "-o", help="Where to write; nothing is overwritten."),
 ]
+AsJson = Annotated[
+    Path | None,
+    typer.Option("--json", help="Write all numbers here; - is standard output."),
+]
 Force = Annotated[
     bool, typer.Option("--force", help="Replace the output of an earlier run.")
 ]

@@ -1,12 +1,18 @@
 """Output that appears whole or not at all, and never in place of a stranger's files."""
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+
+import typer
 
 from pbrdf.files import complete_file, complete_folder
 
-__all__ = ["staged_file", "staged_folder", "staged_store"]
+__all__ = [
+    "alone", "answer", "staged_file", "staged_folder", "staged_store", "write_numbers",
+]  # fmt: skip
 
 # What tells a result folder of this program from any other folder
 MARK = "model.toml"
@@ -78,3 +84,31 @@ def _check_ours(target: Path) -> None:
             "which is neither. Name another."
         )
         raise ValueError(msg)
+
+
+def answer(
+    words: str, numbers: Mapping[str, Any], as_json: Path | None, *, force: bool
+) -> None:
+    """Print an answer in words, its numbers going where --json says.
+
+    On standard output the numbers stand alone.
+    """
+    if not alone(as_json):
+        typer.echo(words)
+    if as_json is not None:
+        write_numbers(numbers, as_json, force=force)
+
+
+def alone(as_json: Path | None) -> bool:
+    """Whether standard output is for numbers."""
+    return str(as_json) == "-"
+
+
+def write_numbers(numbers: Mapping[str, Any], target: Path, *, force: bool) -> None:
+    """Write JSON to a file, or to standard output for -."""
+    text = json.dumps(numbers, indent=2)
+    if alone(target):
+        typer.echo(text)
+        return
+    with staged_file(target, force=force) as stage:
+        stage.write_text(f"{text}\n", encoding="utf-8")

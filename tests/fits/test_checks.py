@@ -1,5 +1,6 @@
 """What a look at a scan finds: each slip with its option, and nothing in good scans."""
 
+import json
 import re
 from pathlib import Path
 
@@ -232,6 +233,25 @@ def test_the_command_exits_by_what_it_finds(capsys):
     assert "--azimuth-of-forward 0" in capsys.readouterr().err
     assert main([*fitted, "--azimuth-of-forward", "0"]) == 0
     assert "0.8999" in capsys.readouterr().out
+
+
+def test_numbers_stand_alone_on_standard_output(capsys, tmp_path):
+    flipped = str(CASES / "flipped.csv")
+    assert main(["check", str(CASES / "good.csv"), flipped, "--json", "-"]) == 1
+    good, wrong = json.loads(capsys.readouterr().out)["scans"]
+    assert (good["file"], wrong["file"]) == ("good.csv", "flipped.csv")
+    (found,) = [f for f in wrong["findings"] if f["severity"] == "error"]
+    assert found["name"] == "exchanged"
+    assert "--azimuth-of-forward 0" in found["cure"]
+    command = ["fit", flipped, "--n", "1.5", "--slope-rms", "0.25"]
+    assert main([*command, "--azimuth-of-forward", "0", "--json", "-"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert abs(printed["parameters"]["specular_gain"]["value"] - 0.8999) < 2e-4
+    # Or in a file, beside the words
+    target = tmp_path / "fit.json"
+    assert main([*command, "--azimuth-of-forward", "0", "--json", str(target)]) == 0
+    assert "0.8999" in capsys.readouterr().out
+    assert json.loads(target.read_text())["parameters"] == printed["parameters"]
 
 
 def test_declared_cases_are_fitted_to_their_truth():

@@ -1,7 +1,8 @@
 """`pbrdf check`: look at scans before they are believed."""
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,6 +22,8 @@ def command(
     angles: declaring.Angles = None,
     quantity: declaring.QuantityOption = None,
     normalised: declaring.Normalised = None,
+    as_json: options.AsJson = None,
+    force: options.Force = False,
 ) -> None:
     """Say what a goniometer file holds, and what in it contradicts physics.
 
@@ -32,22 +35,25 @@ def command(
     """
     from fitting.checks import check_scan
     from pbrdf.cli.reading import read_scan
+    from pbrdf.cli.staging import alone, write_numbers
 
     declared = declaring.declarations(
         columns, azimuth_of_forward, angles, quantity, normalised
     )
-    wrong = False
+    found: list[dict[str, Any]] = []
     for path in scans:
         scan = read_scan(path, wavelength=wavelength, declared=declared)
-        typer.echo(f"{path.name}: {_content(scan)}")
         findings = check_scan(scan)
-        for finding in findings:
-            typer.echo(f"  {finding}")
-        worst = {finding.severity for finding in findings}
-        if not worst & {"error", "warning"}:
-            typer.echo("  Nothing contradicts physics.")
-        wrong = wrong or "error" in worst
-    if wrong:
+        lines = [f"{path.name}: {_content(scan)}", *(f"  {one}" for one in findings)]
+        if not {one.severity for one in findings} & {"error", "warning"}:
+            lines.append("  Nothing contradicts physics.")
+        if not alone(as_json):
+            typer.echo("\n".join(lines))
+        told = [asdict(one) for one in findings]
+        found.append({"file": path.name, "holds": _content(scan), "findings": told})
+    if as_json is not None:
+        write_numbers({"scans": found}, as_json, force=force)
+    if any(one["severity"] == "error" for scan in found for one in scan["findings"]):
         raise typer.Exit(1)
 
 

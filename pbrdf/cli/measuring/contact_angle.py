@@ -1,6 +1,5 @@
 """`pbrdf contact-angle`: contact angles of a drop from its photograph."""
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -37,10 +36,7 @@ def command(
         Path | None,
         typer.Option(help="Draw outline and baseline into the picture here (png)."),
     ] = None,
-    as_json: Annotated[
-        Path | None,
-        typer.Option("--json", help="Write all numbers here; - is standard output."),
-    ] = None,
+    as_json: options.AsJson = None,
     force: options.Force = False,
 ) -> None:
     """Print both contact angles, through the liquid, each with its uncertainty.
@@ -50,7 +46,7 @@ def command(
     pbrdf contact-angle drop.png --baseline 300,80,302,560 --json -
     """
     from fitting import contact_angle
-    from pbrdf.cli.staging import staged_file
+    from pbrdf.cli.staging import answer, staged_file
 
     points = _four("--baseline", baseline, "row and column of two points")
     part = _four("--crop", crop, "first and last row, first and last column")
@@ -68,15 +64,7 @@ def command(
 
         with staged_file(overlay, force=force) as stage:
             write_drop_overlay(stage, photo, found)
-    if as_json is not None:
-        text = json.dumps(found.to_dict(), indent=2)
-        if str(as_json) == "-":
-            typer.echo(text)
-        else:
-            with staged_file(as_json, force=force) as stage:
-                stage.write_text(f"{text}\n", encoding="utf-8")
-    if str(as_json) != "-":
-        typer.echo(_lines(found))
+    answer(_lines(found), found.to_dict(), as_json, force=force)
     for remark in found.warnings:
         typer.echo(f"warning: {remark}.".replace("which=", "--which"), err=True)
 

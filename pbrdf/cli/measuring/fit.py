@@ -93,6 +93,7 @@ def command(
     seed: options.Seed = 0,
     workers: options.Workers = None,
     output: options.Output = None,
+    as_json: options.AsJson = None,
     force: options.Force = False,
 ) -> None:
     """Fit gains, albedos, index or slope to scans, with errors and correlations.
@@ -109,7 +110,7 @@ def command(
     given = dict(locals())
     from pbrdf.cli.progress import progress_bar
     from pbrdf.cli.reading import read_material
-    from pbrdf.cli.staging import staged_folder
+    from pbrdf.cli.staging import answer, staged_folder
 
     declared = declaring.declarations(
         columns, azimuth_of_forward, angles, quantity, normalised,
@@ -160,7 +161,7 @@ def command(
             told, chosen = words_typed(), options.recorded(given)
             record = record_of(files, command="fit", options=chosen, typed=told)
             write_fit(result, measured, stage, record=record)
-    typer.echo(result.summary())
+    answer(result.summary(), result.as_dict(), as_json, force=force)
     if not result.converged:
         raise typer.Exit(1)
 

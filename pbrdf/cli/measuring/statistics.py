@@ -1,6 +1,5 @@
 """`pbrdf statistics`: how rough a measured surface is, and how well that is known."""
 
-import json
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -43,10 +42,7 @@ def command(
             help="Draw surface, mended parts, autocorrelation, spectrum, slopes (png, pdf)."
         ),
     ] = None,
-    as_json: Annotated[
-        Path | None,
-        typer.Option("--json", help="Write all numbers here; - is standard output."),
-    ] = None,
+    as_json: options.AsJson = None,
     scale_bar_um: Annotated[
         float | None,
         typer.Option(min=1e-4, max=1e5, help="Length written at a micrograph's scale bar."),
@@ -89,7 +85,7 @@ def command(
     pbrdf statistics sem.jpg --scale-bar-um 120 --edge 3 --overlay check.png
     """
     from pbrdf.cli.reading import read_surface
-    from pbrdf.cli.staging import staged_file
+    from pbrdf.cli.staging import answer, staged_file
 
     picture = {
         "scale_bar_um": scale_bar_um,
@@ -108,13 +104,7 @@ def command(
     from fitting import surface_statistics
 
     found = surface_statistics(heights, form=options.form(form))
-    if as_json is not None:
-        text = json.dumps(found.to_dict(), indent=2)
-        if str(as_json) == "-":
-            typer.echo(text)
-        else:
-            with staged_file(as_json, force=force) as stage:
-                stage.write_text(f"{text}\n", encoding="utf-8")
+    answer(str(found), found.to_dict(), as_json, force=force)
     if figure is not None:
         from fitting.report.surface import surface_figure
 
@@ -125,9 +115,6 @@ def command(
 
         with staged_file(slopes, force=force) as stage:
             slope_distribution(heights, cutoff=cutoff).to_frame().to_csv(stage, index=False)
-    # Standard output then holds the numbers and nothing else
-    if str(as_json) != "-":
-        typer.echo(str(found))
 
 
 def _draw_overlay(overlay: Path, surface: Path, heights: Any, *, force: bool) -> None:
