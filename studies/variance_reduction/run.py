@@ -47,7 +47,7 @@ CASES: dict[str, tuple[Callable[[], Scene], float, dict[str, object]]] = {
     ),
     "spheres": (
         lambda: Scene(
-            surface(0.15), GLASS, Spheres(radius=6.0, coverage=0.15, material=WATER)
+            surface(0.1), GLASS, Spheres(radius=6.0, coverage=0.10, material=WATER)
         ),
         41.4,
         {"phi_i": 0.6},
@@ -115,7 +115,7 @@ def main() -> int:
     parser.add_argument("--case", action="append", choices=list(CASES))
     parser.add_argument("--seeds", type=int, default=400)
     parser.add_argument("--realizations", type=int, default=64)
-    parser.add_argument("--rays", type=int, default=1000)
+    parser.add_argument("--rays", type=int, default=1500)
     parser.add_argument("--output", type=Path, default=OUTPUT)
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)

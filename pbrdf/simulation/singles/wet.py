@@ -35,6 +35,9 @@ from pbrdf.tracer.wet_field import WetField, register
 # Bins that are corrected: as bright on the clean surface, relative to the brightest, and
 # with as many of its rays in all samples, so that no bin turns negative by chance
 DARKEST, FEWEST_RAYS = 1e-3, 30.0
+# It pays where the noise of the slopes rules: where bins above this part of the peak of the
+# clean surface have so many rays a sample, and bodies leave so much of them
+BRIGHT, LEAST_RAYS, LEAST_SHARE = 0.1, 30.0, 0.5
 # Reflectance from which on too little is absorbed to take what the correction adds or takes
 MOST_REFLECTED = 0.98
 # Looks at facets and what they cost are a small part here: noise of bodies is left anyway
@@ -60,7 +63,11 @@ def beside_bodies(
     ):
         return None
     found = [BesideBodies.of(scene, surface, one, samples) for one in plans]
-    if not all(one.wanted.any() for one in found):
+    bodies = found[0].on_plane(np.random.SeedSequence(0))
+    found = [
+        one.where_it_pays(bodies, each) for one, each in zip(found, plans, strict=True)
+    ]
+    if not any(one.wanted.any() for one in found):
         return None
     return found if max(one.reflected for one in found) < MOST_REFLECTED else None
 
@@ -134,6 +141,27 @@ class BesideBodies:
         sent = (self.light[..., 0, 0] * unit[:, None]).sum(axis=(2, 3))
         return float((sent / whole).max())
 
+    def where_it_pays(self, bodies: Bodies | None, plan: Plan) -> "BesideBodies":
+        """Return the same for directions only where more is gained than it costs.
+
+        `bodies` are any that may lie on the plane.
+        """
+        wanted = self.wanted.copy()
+        for a, unit in enumerate(self.unit):
+            bright = unit > BRIGHT * unit.max()
+            if bodies is None or unit[bright].mean() * plan.n_rays < LEAST_RAYS:
+                wanted[a] = False
+                continue
+            # No rays are sent
+            source = Source(
+                np.sin(plan.theta_i[a]), np.cos(plan.theta_i[a]), plan.phi_i or 0.0,
+                plan.phi_i is None, np.zeros(4), 1, 1, np.zeros(3), np.uint64(0),
+                np.sin(plan.half_angle),
+            )  # fmt: skip
+            share = _share(bodies, source, np.array([0.5, 0.5]), bright, _room(1))
+            wanted[a] &= (share * unit)[bright].sum() > LEAST_SHARE * unit[bright].sum()
+        return replace(self, wanted=wanted)
+
     def part(self, first: int, last: int) -> "BesideBodies":
         """Return those of some directions."""
         here = slice(first, last)
@@ -179,7 +207,7 @@ class BesideBodies:
         starts = rng.random((plan.n_streams, 2, 2))[plan.own]
         light = drawn(plan, rays)
         terrain = target.world.terrain
-        for a in range(len(plan.theta_i)):
+        for a in np.flatnonzero(self.wanted.any(axis=(1, 2))).tolist():
             expected = self.single.seen_by_bin(terrain, plan, a, streams[a])
             source = source_of(target.field, plan, a, light)
             change = self._change(
@@ -200,20 +228,30 @@ class BesideBodies:
         expected: np.ndarray,
     ) -> np.ndarray:
         """Rays to add to each bin (n_theta, n_dphi), zero in the mean."""
-        longest = -(-source.n_rays // source.n_lines)
-        room = SightRoom(
-            np.empty((longest, N_FIRST)), np.empty((1, N_STATE)), np.empty(N_HIT)
-        )
+        room = _room(-(-source.n_rays // source.n_lines))
         counts = Counts(*np.zeros((3, *wanted.shape)))
         count_seen(
             target.world.terrain, bodies, source, target.field.terrain.z_top, starts[0],
             ELSEWHERE, bin_edges(*wanted.shape), wanted, room, counts,
         )  # fmt: skip
         # Of the bodies on the plane alone, so that it goes with no noise of the slopes
-        share = np.zeros(wanted.shape)
-        theta_s, dphi, _ = detector_bins(*wanted.shape)
-        places = max(PLACES // max(int(wanted.sum()), 1), 8)
-        share_seen(bodies, source, starts[1], places, wanted, (theta_s, dphi), room, share)
+        share = _share(bodies, source, starts[1], wanted, room)
         excess = np.where(wanted, counts.clean - source.n_rays * expected, 0.0)
         change: np.ndarray = counts.elsewhere / ELSEWHERE - counts.here - share * excess
         return change
+
+
+def _room(longest: int) -> SightRoom:
+    """Room to work in, for lines of so many rays."""
+    return SightRoom(np.empty((longest, N_FIRST)), np.empty((1, N_STATE)), np.empty(N_HIT))
+
+
+def _share(
+    bodies: Bodies, source: Source, start: np.ndarray, wanted: np.ndarray, room: SightRoom
+) -> np.ndarray:
+    """Share of the plane that is seen from the source and from each bin."""
+    share = np.zeros(wanted.shape)
+    theta_s, dphi, _ = detector_bins(*wanted.shape)
+    places = max(PLACES // max(int(wanted.sum()), 1), 8)
+    share_seen(bodies, source, start, places, wanted, (theta_s, dphi), room, share)
+    return share
