@@ -62,8 +62,9 @@ def lay_out(figure: "Figure", rounds: int = 2) -> None:
     two rounds. Call it under the settings that the figure is saved under, out of those of
     `small`.
     """
-    for _ in range(rounds):
-        figure.draw_without_rendering()
+    engine = figure.get_layout_engine()
+    for _ in range(rounds if engine is not None else 0):
+        engine.execute(figure)
     figure.set_layout_engine("none")
 
 
