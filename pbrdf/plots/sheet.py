@@ -63,7 +63,8 @@ def lay_out(figure: "Figure", rounds: int = 2) -> None:
     `small`.
     """
     engine = figure.get_layout_engine()
-    for _ in range(rounds if engine is not None else 0):
+    assert engine is not None  # see `new_figure`
+    for _ in range(rounds):
         engine.execute(figure)
     figure.set_layout_engine("none")
 
