@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from data_io import ConventionWarning, read_goniometer, write_goniometer
-from pbrdf import Material, MicrofacetModel
+from pbrdf import Material, MicrofacetModel, materials
 from pbrdf.cli import main
 from pbrdf.errors import DataFileError
 
@@ -357,6 +357,13 @@ def test_elements_that_may_be_counted_from_one_are_refused(tmp_path, header, row
         with pytest.raises(DataFileError, match=r"M11 is the reflectance M00") as caught:
             read_goniometer(tmp_path / "s.csv", **said)
         assert cure in str(caught.value)
+
+
+def test_constants_without_a_common_wavelength_are_refused(tmp_path):
+    path = tmp_path / "apart.csv"
+    path.write_text("wl,n\n0.4,1.5\n0.5,1.4\n\nwl,k\n0.6,0.1\n0.7,0.2\n")
+    with pytest.raises(DataFileError, match=r"n from 0.4 to 0.5 um, kappa from 0.6 to 0.7"):
+        materials.read(path)
 
 
 def test_ratios_that_may_be_counted_from_one_are_refused(tmp_path):

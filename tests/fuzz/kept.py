@@ -54,7 +54,7 @@ def _lines(found: xr.Dataset, path: Path) -> str | None:
     """Look for M00 and the zenith of the detector on one line of a plain table."""
     text = _text(path)
     plain = found.attrs.get("quantity", "brdf") == "brdf" and "declared" not in found.attrs
-    scaled = re.search(r"scale|I_s|rad|/sr|%", text or "")
+    scaled = re.search(r"scale|I_s|rad|%", text or "")
     if text is None or not plain or scaled or "M00" not in found:
         return None
     lines = [_numbers(line) for line in text.splitlines()]

@@ -14,6 +14,7 @@ def test_damaged_files_are_refused_by_name(name):
     assert tally.get("refused", 0) > 5
 
 
+@pytest.mark.filterwarnings("ignore::data_io.ConventionWarning")
 @pytest.mark.parametrize("name", ["goniometer", "fred", "table-utf16", "astm", "wide"])
 def test_values_in_another_place_are_noticed(name, tmp_path):
     make, suffix, read = READERS[name]

@@ -54,7 +54,8 @@ def read(path: str | Path | Traversable) -> Material:
     ------
     DataFileError
         Naming all unknown columns at once, a missing or implausible unit, or the line and
-        column of the first value that is no number, negative or given twice.
+        column of the first value that is no number, negative or given twice; or constants
+        that are nowhere known together.
 
     Warns
     -----
@@ -74,9 +75,19 @@ def read(path: str | Path | Traversable) -> Material:
         problem = f"expected n, got {', '.join(found)} only"
         raise DataFileError(name, problem, "Give n beside kappa.")
     albedo: Any = found.get("diffuse_albedo", 0.0)
-    return Material(
+    material = Material(
         found["n"], found.get("kappa", 0.0), albedo, name=_stem(name), source=source
     )
+    low, high = material.valid_range
+    if low > high:
+        ranges = ", ".join(
+            "{} from {:.4g} to {:.4g} um".format(role, *constant.valid_range)
+            for role, constant in found.items()
+            if callable(constant)
+        )
+        problem = f"expected constants at common wavelengths, got {ranges}"
+        raise DataFileError(name, problem, "Give all of them over one range.")
+    return material
 
 
 def read_constant(path: str | Path, role: str) -> Dispersion | float:
