@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pbrdf.stored.parameters import Cloud, Parameter
+
 __all__ = ["Contents", "Parameter", "open_contents"]
 
 _BOUND = "pbrdf_sweep"
@@ -16,69 +18,6 @@ _UNITS = {"_deg": ("rad", np.pi / 180), "_um": ("um", 1.0)}
 _OWN = ("theta_i", "theta_s", "dphi", "stokes_out", "stokes_in")
 # Numbers between which nothing lies
 _APART = ("seed", "n_rays", "realizations", "max_bounces", "phi_i")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Parameter:
-    """An axis of the store beside the angles.
-
-    Attributes
-    ----------
-    name : str
-        As an argument of Python: without the unit of the file.
-    dim : str
-        As a dimension of the store.
-    unit : str
-    nodes : ndarray
-        In that unit, as they stand in the store.
-    number : bool
-        Whether there is anything between its values.
-    """
-
-    name: str
-    dim: str
-    unit: str
-    nodes: np.ndarray
-    number: bool
-
-    def told(self, value: Any) -> str:
-        """Write a value with its unit."""
-        text = f"{value:.6g}" if self.nodes.dtype.kind == "f" else str(value)
-        return f"{text} {self.unit}" if self.unit else text
-
-    def check(self, value: Any) -> Any:
-        """Return a value that the store can answer for.
-
-        Raises
-        ------
-        ValueError
-            If it is outside of the range, or none of those computed where none lie between.
-        """
-        if not self.number:
-            same = [one for one in self.nodes if self._same(one, value)]
-            if same:
-                return same[0]
-            msg = (
-                f"{self.name} must be one of {', '.join(map(self.told, self.nodes))}, "
-                f"which were computed, got {value!r}."
-            )
-            raise ValueError(msg)
-        low, high = float(self.nodes.min()), float(self.nodes.max())
-        slack = 1e-9 * max(abs(low), abs(high))
-        if not low - slack <= float(value) <= high + slack:
-            msg = (
-                f"{self.name} must lie in the store's {low:.6g} to {self.told(high)}, got "
-                f"{float(value):.6g}. Compute it by a sweep that goes so far."
-            )
-            raise ValueError(msg)
-        return min(max(float(value), low), high)
-
-    def _same(self, one: Any, value: Any) -> bool:
-        if self.nodes.dtype.kind != "f":
-            return str(one) == str(value)
-        return isinstance(value, int | float | np.number) and bool(
-            np.isclose(one, float(value), rtol=1e-9, atol=1e-12)
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,11 +31,14 @@ class Contents:
         Opened lazily, each axis rising.
     parameters : dict of str to Parameter
         By name.
+    cloud : Cloud, optional
+        Points of a list or a sample, for the parameters that it names.
     """
 
     path: Path
     dataset: xr.Dataset
     parameters: dict[str, Parameter]
+    cloud: Cloud | None = None
 
     def named(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Return values by name; names of the store with their unit are understood.
@@ -124,14 +66,18 @@ class Contents:
             )
         for name, known in self.parameters.items():
             if name not in values and len(known.nodes) > 1:
-                ends = f"{known.told(known.nodes[0])} to {known.told(known.nodes[-1])}"
+                ends = " to ".join(map(known.told, known.ends))
                 msg = f"{name} must be given, the store has it from {ends}."
                 raise ValueError(msg)
             values.setdefault(name, known.nodes[0])
         return values
 
-    def read(self, place: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def read(
+        self, place: Mapping[str, np.ndarray], incidences: list[int] | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Read the BRDF of all bounces and its error at indices along each parameter.
+
+        `point` is that of a list or a sample; `incidences` picks some.
 
         Returns
         -------
@@ -142,9 +88,11 @@ class Contents:
         ValueError
             If one of these points is not finished.
         """
-        here = self.dataset.isel({self.parameters[n].dim: k for n, k in place.items()})
+        dims = [self.parameters[n].dim if n in self.parameters else n for n in place]
+        here = self.dataset.isel(dict(zip(dims, place.values(), strict=True)))
+        here = here if incidences is None else here.isel(theta_i=incidences)
         self._check_done(here)
-        order = (*(self.parameters[name].dim for name in place), *_OWN)
+        order = (*dims, *_OWN)
         return (
             here.brdf_total.transpose(*order).to_numpy(),
             here.brdf_total_stderr.transpose(*order).to_numpy(),
@@ -171,7 +119,8 @@ def open_contents(path: str | Path) -> Contents:
     Raises
     ------
     ValueError
-        If it is no store of a sweep over a grid with all Stokes elements.
+        If it is no store of a sweep with all Stokes elements, or its points are a list or
+        a sample of anything but numbers.
     FileNotFoundError
         If there is none.
     """
@@ -181,20 +130,36 @@ def open_contents(path: str | Path) -> Contents:
     dataset = _opened(path)
     if "theta_i" not in dataset.dims:
         dataset = dataset.expand_dims("theta_i")
-    parameters = {}
+    parameters: dict[str, Parameter] = {}
+    cloud = None
     for dim in map(str, dataset.brdf_total.dims):
         if dim in _OWN:
             continue
-        name, unit, factor = _in_words_of_python(dim)
-        number = dataset[dim].dtype.kind == "f" and name not in _APART
-        if number:
+        if dim == "point":
+            scattered = [str(n) for n, v in dataset.variables.items() if "scale" in v.attrs]
+            # A result of one wavelength each has no other name for them
+            dataset = dataset.set_coords(scattered)
+            held = [_parameter(dataset, name) for name in scattered]
+            cloud = Cloud.of(dataset.state, held, [dataset[n].attrs for n in scattered])
+            parameters |= {one.name: one for one in held}
+            continue
+        one = _parameter(dataset, dim)
+        if one.number:
             dataset = dataset.sortby(dim)
-        nodes = dataset[dim].to_numpy()
-        nodes = nodes * factor if nodes.dtype.kind == "f" else nodes
-        parameters[name] = Parameter(
-            name=name, dim=dim, unit=unit, nodes=nodes, number=number
-        )
-    return Contents(path=path, dataset=dataset.sortby("theta_i"), parameters=parameters)
+            one = _parameter(dataset, dim)
+        parameters[one.name] = one
+    dataset = dataset.sortby("theta_i")
+    return Contents(path=path, dataset=dataset, parameters=parameters, cloud=cloud)
+
+
+def _parameter(dataset: xr.Dataset, dim: str) -> Parameter:
+    name, unit, factor = _in_words_of_python(dim)
+    nodes = dataset[dim].to_numpy()
+    number = nodes.dtype.kind == "f"
+    return Parameter(
+        name=name, dim=dim, unit=unit, nodes=nodes * factor if number else nodes,
+        number=number and name not in _APART,
+    )  # fmt: skip
 
 
 def _opened(path: Path) -> xr.Dataset:
@@ -210,12 +175,6 @@ def _opened(path: Path) -> xr.Dataset:
     if not bound:
         msg = (
             f"path must be a store of pbrdf sweep, got {path}. Give its folder, NAME.zarr."
-        )
-        raise ValueError(msg)
-    if dataset.attrs["design"] != "grid":
-        msg = (
-            f"the store must be that of a grid, got kind = {dataset.attrs['design']!r}, "
-            "whose points have nothing between them. Read those by xarray.open_zarr."
         )
         raise ValueError(msg)
     held = [dataset.sizes.get(name, 0) for name in ("stokes_out", "stokes_in")]

@@ -12,7 +12,7 @@ import xarray as xr
 
 from pbrdf.conventions import RESULT_VARIABLES, STOKES
 from pbrdf.errors import AccuracyWarning, require
-from pbrdf.stored.contents import Contents, open_contents
+from pbrdf.stored.contents import Contents, Parameter, open_contents
 from pbrdf.stored.left_out import (
     CLASSES,
     Measured,
@@ -38,7 +38,7 @@ COARSE = 0.5
 
 
 def from_store(path: str | Path) -> "StoredBRDF":
-    """Open the store of a sweep over a grid as a BRDF.
+    """Open the store of a sweep as a BRDF.
 
     Parameters
     ----------
@@ -48,11 +48,17 @@ def from_store(path: str | Path) -> "StoredBRDF":
     Raises
     ------
     ValueError
-        If it is no store of a sweep over a grid with all Stokes elements.
+        If it is no store of a sweep with all Stokes elements, or its points are a list or
+        a sample of anything but numbers, or too few.
     FileNotFoundError
         If there is none.
     """
-    return StoredBRDF(open_contents(path))
+    contents = open_contents(path)
+    if contents.cloud is None:
+        return StoredBRDF(contents)
+    from pbrdf.stored.scattered import ScatteredBRDF
+
+    return ScatteredBRDF(contents)
 
 
 class StoredBRDF:
@@ -80,9 +86,7 @@ class StoredBRDF:
         """What theta_i and each parameter may be: (low, high), or the values computed."""
         found = {"theta_i": (float(self._theta_i[0]), float(self._theta_i[-1]))}
         return found | {
-            name: (float(one.nodes[0]), float(one.nodes[-1]))
-            if one.number
-            else tuple(one.nodes.tolist())
+            name: one.ends if one.number else tuple(one.nodes.tolist())
             for name, one in self._contents.parameters.items()
         }
 
@@ -347,7 +351,7 @@ class StoredBRDF:
     def _between_points(self, place: dict[str, Any]) -> np.ndarray:
         """Error of the interpolation along all parameters, by class."""
         total = np.zeros((len(CLASSES), 4, 4))
-        for name, parameter in self._contents.parameters.items():
+        for name, parameter in self._axes.items():
             nodes = parameter.nodes
             if not parameter.number or np.isclose(nodes, place[name], rtol=1e-9).any():
                 continue
@@ -361,13 +365,22 @@ class StoredBRDF:
                 total = np.hypot(total, along(scheme, nodes, place[name], found))
         return total
 
-    def _reduced(
-        self, place: dict[str, Any], keep: str | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Hemispheres of all incidences at a place; along one parameter all its nodes."""
+    @property
+    def _axes(self) -> dict[str, Parameter]:
+        """Parameters that are dimensions of the store."""
+        return self._contents.parameters
+
+    def _middle(self) -> dict[str, np.ndarray]:
+        """Return the middle of all axes."""
+        return {n: np.array([(len(p.nodes) - 1) // 2]) for n, p in self._axes.items()}
+
+    def _stencil(
+        self, place: dict[str, Any], keep: str | None
+    ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+        """Return indices and weights of the points about a place, along each axis."""
         stencil: dict[str, np.ndarray] = {}
         weights: dict[str, np.ndarray] = {}
-        for name, parameter in self._contents.parameters.items():
+        for name, parameter in self._axes.items():
             if name == keep:
                 stencil[name] = np.arange(len(parameter.nodes))
             elif parameter.number and len(parameter.nodes) > 1:
@@ -377,6 +390,13 @@ class StoredBRDF:
             else:
                 stencil[name] = np.flatnonzero(parameter.nodes == place[name])[:1]
                 weights[name] = np.ones(1)
+        return stencil, weights
+
+    def _reduced(
+        self, place: dict[str, Any], keep: str | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Hemispheres of all incidences at a place; along one parameter all its nodes."""
+        stencil, weights = self._stencil(place, keep)
         value, stderr = self._contents.read(stencil)
         for axis, name in reversed(list(enumerate(stencil))):
             if name == keep:
@@ -394,10 +414,9 @@ class StoredBRDF:
     @cached_property
     def _measured(self) -> dict[str, Measured]:
         """Choose how to interpolate along each axis, at the middle of all others."""
-        parameters = self._contents.parameters
-        middle = {n: np.array([(len(p.nodes) - 1) // 2]) for n, p in parameters.items()}
+        middle = self._middle()
         found: dict[str, Measured] = {}
-        for name, one in parameters.items():
+        for name, one in self._axes.items():
             if one.number and len(one.nodes) > 1:
                 line = middle | {name: np.arange(len(one.nodes))}
                 value, stderr = (

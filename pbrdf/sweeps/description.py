@@ -16,7 +16,7 @@ from pbrdf.scene.read import scene_of
 from pbrdf.scene.scene import Scene
 from pbrdf.sweeps.designs import Axis, Design
 from pbrdf.sweeps.places import changed, resolve, written
-from pbrdf.sweeps.settings import FIXED, RUN_KEYS, TOGETHER, arguments
+from pbrdf.sweeps.settings import FIXED, RUN_KEYS, TOGETHER, WHOLE, arguments
 
 __all__ = ["Sweep", "load_sweep", "sweep_of"]
 
@@ -228,7 +228,7 @@ def _flat(vary: Mapping[str, Any], before: str = "") -> dict[str, Any]:
     """Join [vary.surface] slope_rms to surface.slope_rms; ranges stay."""
     out: dict[str, Any] = {}
     for key, value in vary.items():
-        if isinstance(value, dict) and not value.keys() <= _RANGE:
+        if isinstance(value, dict) and not value.keys() & {"from", "to"}:
             out |= _flat(value, f"{before}{key}.")
         else:
             out[before + key] = value
@@ -242,6 +242,16 @@ def _axis(name: str, given: Any, document: Mapping[str, Any]) -> Axis:
         raise ValueError(msg)
     if isinstance(given, Mapping):
         low, high, scale = given.get("from"), given.get("to"), given.get("scale", "linear")
+        unknown = [key for key in given if key not in _RANGE]
+        if unknown:
+            msg = f"{name}: unknown key {unknown[0]!r}. Known: from, to, scale."
+            raise ValueError(msg)
+        if path[-1] in WHOLE:
+            msg = (
+                f"{name} must be whole numbers, got the range {dict(given)}, which has all "
+                "numbers. Give a list of values."
+            )
+            raise ValueError(msg)
         known = scale in ("linear", "log")
         numbers = all(type(v) in (int, float) for v in (low, high))
         if not numbers or not known or not low < high or (scale == "log" and low <= 0):  # type: ignore[operator]

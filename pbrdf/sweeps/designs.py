@@ -92,9 +92,14 @@ class Design:
             told = ", ".join(f"{name} {length}" for name, length in lengths.items())
             msg = f"values of a list must be as many for each name, got {told}."
             raise ValueError(msg)
-        if sampled and self.points < 1:
-            msg = f"[design]: points must be 1 or more for {self.kind}, got {self.points}."
-            raise ValueError(msg)
+        for name, least in (("points", 1 if sampled else 0), ("seed", 0)):
+            value = getattr(self, name)
+            if type(value) is not int or value < least:
+                msg = (
+                    f"[design]: {name} must be a whole number from {least} on for "
+                    f"{self.kind}, got {value!r}."
+                )
+                raise ValueError(msg)
         if self.kind == "sobol" and self.points & (self.points - 1):
             near = 2 ** round(math.log2(self.points))
             msg = (

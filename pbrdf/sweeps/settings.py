@@ -32,6 +32,7 @@ TOGETHER = {
 }  # fmt: skip
 # What decides shapes; and what a sweep has as a matter of course
 FIXED = ("n_theta", "n_dphi", "stokes")
+WHOLE = ("n_rays", "realizations", "max_bounces", "seed")
 _DEFAULTS = {"theta_i_deg": 30.0, "phi_i_deg": "uniform", "seed": 0}
 _PLAIN = {"n_rays": 100_000, "realizations": 16}
 
