@@ -3,7 +3,6 @@
 import warnings
 from collections import OrderedDict
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import xarray as xr
 
 from pbrdf.conventions import RESULT_VARIABLES, STOKES
 from pbrdf.errors import AccuracyWarning, require
-from pbrdf.stored.contents import Contents, Parameter, open_contents
+from pbrdf.stored.contents import Contents, Parameter
 from pbrdf.stored.left_out import (
     CLASSES,
     Measured,
@@ -29,7 +28,7 @@ from pbrdf.stored.schemes import SCHEMES, Scheme, combined
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["StoredBRDF", "from_store"]
+__all__ = ["StoredBRDF"]
 
 # Points of the parameters that stay in memory, and directions at once
 _KEPT, _AT_ONCE = 8, 20_000
@@ -37,32 +36,8 @@ _KEPT, _AT_ONCE = 8, 20_000
 COARSE = 0.5
 
 
-def from_store(path: str | Path) -> "StoredBRDF":
-    """Open the store of a sweep as a BRDF.
-
-    Parameters
-    ----------
-    path : str or Path
-        Folder of the store, NAME.zarr. Points are read when they are asked for.
-
-    Raises
-    ------
-    ValueError
-        If it is no store of a sweep with all Stokes elements, or its points are a list or
-        a sample of anything but numbers, or too few.
-    FileNotFoundError
-        If there is none.
-    """
-    contents = open_contents(path)
-    if contents.cloud is None:
-        return StoredBRDF(contents)
-    from pbrdf.stored.scattered import ScatteredBRDF
-
-    return ScatteredBRDF(contents)
-
-
 class StoredBRDF:
-    """A Mueller BRDF interpolated in the store of a sweep; `from_store` opens it.
+    """A Mueller BRDF interpolated in the store of a sweep; `pbrdf.from_store` opens it.
 
     `brdf`, `stderr` and `error` take the angles, the wavelength where the store has
     several, and what the sweep varied by its name without unit: angles in radians, lengths
