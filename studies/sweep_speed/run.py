@@ -159,7 +159,7 @@ def main() -> None:
 
 
 # Rays for about one second and about ten milliseconds on a core that is free
-LONG, MIDDLE, SHORT = 300_000, 20_000, 300
+LONG, MIDDLE, SHORT = 1_300_000, 200_000, 300
 
 if __name__ == "__main__":
     main()
