@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
+# Signs of a message about a file, whatever the file holds
+MOST_SIGNS = 320
 
 
 def shortened(text: str, most: int) -> str:
@@ -50,6 +52,8 @@ def of_kind(notes: Iterable[str]) -> list[list[str]]:
 class DataFileError(ValueError):
     """A file that cannot be used, with the place of the fault and how to mend it.
 
+    The message has one line and at most 320 signs: what a file says of itself is shortened.
+
     Parameters
     ----------
     path : str or Path
@@ -79,12 +83,15 @@ class DataFileError(ValueError):
         line: int | None = None,
         column: str | None = None,
     ) -> None:
-        place = shortened(Path(path).name, 120)
+        place = shortened(Path(path).name, 80)
         if line is not None:
             place += f" line {line}"
         if column is not None:
             place += f", column {shortened(column, 60)}"
-        super().__init__(f"{place}: {shortened(problem, 220)}. {shortened(cure, 400)}")
+        room = MOST_SIGNS - len(place) - len(": . ")
+        problem = shortened(" ".join(problem.split()), max(room - len(cure), room // 2))
+        cure = shortened(" ".join(cure.split()), room - len(problem))
+        super().__init__(f"{place}: {problem}. {cure}")
         self.path = Path(path)
         self.line = line
         self.column = column

@@ -1,14 +1,13 @@
 """What the person who reads a file says about it, because the file does not."""
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from data_io.text.text import read_lines
 from pbrdf.errors import DataFileError
+from pbrdf.files import read_toml
 
 __all__ = ["QUANTITY_NAMES", "Declared", "declared", "read_mapping"]
 
@@ -118,12 +117,7 @@ def read_mapping(path: str | Path) -> Declared:
     DataFileError
         If the file is not TOML, or a key is unknown or has a wrong value.
     """
-    text = "\n".join(line.text for line in read_lines(path))
-    try:
-        document = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        problem = f"expected a TOML file of conventions, got: {error}"
-        raise DataFileError(path, problem, "Mend the line named.") from error
+    document = read_toml(path)
     unknown = [key for key in document if key not in _MAPPING_KEYS]
     if unknown:
         problem = f"expected known keys, got {', '.join(map(repr, unknown))}"

@@ -179,6 +179,9 @@ def _grain_correlation(trace: Trace) -> np.ndarray:
     n = grain.shape[1]
     power = (np.abs(np.fft.rfft(grain, 2 * n, axis=1)) ** 2).sum(axis=0)
     found = np.fft.irfft(power)[: n // 4]
+    if not found[0] > 0:
+        # No grain at all, as of a drawing
+        return found[:0]
     found = found / found[0]
     # Of white noise it scatters by 1 / sqrt(2 n)
     small = np.flatnonzero(found < 2 / np.sqrt(2 * n))

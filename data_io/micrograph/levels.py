@@ -1,6 +1,9 @@
 """From an image file to flattened intensities: 0 in the dark phase, 1 in the bright one."""
 
+import logging
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -79,13 +82,9 @@ def load_grey(path: str | Path) -> tuple[np.ndarray, str]:
 
 def _decode(path: Path) -> np.ndarray:
     """Return the samples of a single picture that is large enough."""
-    from skimage import io
-
     check_pixels(path, file_size(path))
     try:
-        # A decoder that refuses a file leaves it open; this closes it
-        with path.open("rb") as stream:
-            image = np.asarray(io.imread(stream))
+        image = decoded(path)
     except Exception as error:  # each decoder behind imread has its own family of errors
         problem = (
             "expected a picture (PNG, TIFF, JPEG, BMP), got a file that none can decode"
@@ -108,6 +107,26 @@ def _decode(path: Path) -> np.ndarray:
         problem = "expected finite grey levels, got NaN or infinity"
         raise DataFileError(path, problem, "Fill or cut the missing pixels.")
     return image
+
+
+def decoded(path: Path) -> np.ndarray:
+    """Return the samples of a picture; what a decoder raises comes as it is."""
+    from skimage import io
+
+    # A decoder that refuses a file leaves it open; this closes it
+    with path.open("rb") as stream, unheard():
+        return np.asarray(io.imread(stream))
+
+
+@contextmanager
+def unheard() -> Iterator[None]:
+    """Keep what tifffile logs of a damaged picture from standard error."""
+    log = logging.getLogger("tifffile")
+    earlier, log.disabled = log.disabled, True
+    try:
+        yield
+    finally:
+        log.disabled = earlier
 
 
 def check_pixels(path: Path, size: int) -> None:

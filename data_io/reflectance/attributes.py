@@ -2,20 +2,22 @@
 
 import hashlib
 import json
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-__all__ = ["CHECKSUMS", "decode", "digest", "encode"]
+__all__ = ["CHECKSUMS", "OF_ATTRS", "decode", "digest", "digest_of_attrs", "encode"]
 
 # Marks an attribute that netCDF cannot hold as it is: truth values, None, lists, mappings
 _JSON = "json:"
 _INT64 = 2**63
 # Attribute that holds the checksum of each variable
 CHECKSUMS = "pbrdf_checksums"
+# Stands among the names of variables, of which none can be this
+OF_ATTRS = "."
 
 
 def digest(variable: xr.Variable) -> str:
@@ -25,9 +27,18 @@ def digest(variable: xr.Variable) -> str:
     held = values.reshape(-1)
     content = "\0".join(map(str, held)).encode() if text else held.tobytes()
     kind = "text" if text else values.dtype.str
-    attrs = sorted((str(key), str(value)) for key, value in variable.attrs.items())
-    head = f"{variable.dims} {values.shape} {kind} {attrs}"
+    head = f"{variable.dims} {values.shape} {kind} {_in_order(variable.attrs)}"
     return hashlib.sha256(head.encode() + b"\0" + content).hexdigest()
+
+
+def digest_of_attrs(attrs: Mapping[Any, Any]) -> str:
+    """Return a checksum of encoded attributes but for the checksums among them."""
+    held = {name: value for name, value in attrs.items() if name != CHECKSUMS}
+    return hashlib.sha256(str(_in_order(held)).encode()).hexdigest()
+
+
+def _in_order(attrs: Mapping[Any, Any]) -> list[tuple[str, str]]:
+    return sorted((str(key), str(value)) for key, value in attrs.items())
 
 
 def encode(attrs: dict[Any, Any]) -> dict[Any, Any]:

@@ -1,37 +1,42 @@
 """Results in Zarr stores: folders of chunks, for what is too large for one file.
 
-A store is written direction by direction and holds a checksum of each variable, for each
-direction where it has that dimension.
+A store is written direction by direction, and by groups of wavelengths where one direction
+is too large; it holds a checksum of each variable, for each direction and each group.
 """
 
 import json
-import stat
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from itertools import chain
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from data_io.reflectance.attributes import CHECKSUMS, digest, encode
-from data_io.reflectance.stored import DAMAGED, FAULTS, HOSTILE, MOST_EXPANSION, first_line
+from data_io.reflectance.attributes import (
+    CHECKSUMS,
+    OF_ATTRS,
+    digest,
+    digest_of_attrs,
+    encode,
+)
+from data_io.reflectance.stored import DAMAGED, FAULTS, first_line
 from pbrdf.errors import DataFileError
 from pbrdf.files import complete_folder
+from pbrdf.files.stores import check_store, description
 from pbrdf.files.writing import ExistsError
 from pbrdf.tracer.memory import SHARE, free_bytes, told
 
 __all__ = ["fill_store", "is_result_store", "read_store", "write_store"]
 
-# Along it stores are written
-ALONG = "theta_i"
+# Along them stores are written; the checksums of a variable go by the first, then the other
+ALONG, WITHIN = "theta_i", "wavelength"
+# Stands among the names of variables: the size of a group of wavelengths
+_GROUP = "./wavelength"
 # Larger chunks are cut further [bytes]
 _CHUNK = 64 * 2**20
-# What this program writes; others might run anything, or fetch data from elsewhere
-_CODECS = {"bytes", "zstd", "vlen-utf8", "crc32c"}
-_MOST_FILES, _MOST_METADATA = 200_000, 16 * 2**20
 # Counts that parts have each their own of
 _SUMMED = ("path_segments", "self_hits", "exact_searches", "medium_mismatches")
 
@@ -74,17 +79,35 @@ def fill_store(parts: Iterable[xr.Dataset], folder: Path) -> dict[str, Any]:
     """Write the parts of a result into an empty folder; return the attributes of all."""
     zarr = _zarr()
     whole: dict[str, Any] = {}
-    checksums: dict[str, list[str]] = {}
+    found: dict[str, dict[tuple[int, ...], str]] = {}
+    group, rows = 0, 0
     for number, part in enumerate(parts):
-        _write_part(part, folder, first=number == 0)
+        first = part.encoding.get("first", {ALONG: rows, WITHIN: 0})
+        of_direction = not first[WITHIN]
+        _write_part(part, folder, first if number else None)
+        if number and not first[ALONG] and not group:
+            group = first[WITHIN]
         for name, variable in part.variables.items():
-            held = checksums.setdefault(str(name), [])
-            if ALONG in variable.dims or number == 0:
-                held.extend(_digests(variable))
-        whole = _joined(whole, part.attrs) if number else dict(part.attrs)
+            held = found.setdefault(str(name), {})
+            # What has neither dimension is in all parts, and what lacks one in some
+            again = ALONG not in variable.dims and first[ALONG] > 0
+            again |= WITHIN not in variable.dims and not of_direction
+            if not again:
+                held.update(_digests(variable, first))
+        rows = first[ALONG] + part.sizes.get(ALONG, 0)
+        whole = (
+            _joined(whole, part.attrs, anew=of_direction) if number else dict(part.attrs)
+        )
+    checksums = {
+        name: [held[place] for place in sorted(held)] for name, held in found.items()
+    }
+    if group:
+        checksums[_GROUP] = [str(group)]
     with _quiet():
         root = zarr.open_group(folder, mode="r+")
-        root.attrs.update(encode(whole) | {CHECKSUMS: json.dumps(checksums)})
+        encoded = encode(whole)
+        checksums[OF_ATTRS] = [digest_of_attrs(encoded)]
+        root.attrs.update(encoded | {CHECKSUMS: json.dumps(checksums)})
         zarr.consolidate_metadata(folder)
     return whole
 
@@ -92,7 +115,7 @@ def fill_store(parts: Iterable[xr.Dataset], folder: Path) -> dict[str, Any]:
 def is_result_store(path: str | Path) -> bool:
     """Tell whether a folder is the store of a result, not that of a sweep or none."""
     try:
-        return CHECKSUMS in _metadata(Path(path) / "zarr.json")["attributes"]
+        return CHECKSUMS in description(Path(path))["attributes"]
     except (DataFileError, OSError, KeyError, TypeError):
         return False
 
@@ -110,12 +133,13 @@ def read_store(path: str | Path) -> xr.Dataset:
     if not path.is_dir() or not is_result_store(path):
         problem = "expected the store of a result, got something else"
         raise DataFileError(path, problem, "Give a folder NAME.zarr of this program.")
-    _check_folder(path)
+    check_store(path)
     try:
         with _quiet():
             stored = xr.open_zarr(path, chunks=None, consolidated=False, decode_times=False)
             checksums = json.loads(stored.attrs.pop(CHECKSUMS))
             names = {name: list(held) for name, held in checksums.items()}
+            group = int(names.pop(_GROUP, ["0"])[0])
     except FAULTS as error:
         problem = f"cannot be read: {first_line(error)}"
         place = _unreadable(path)
@@ -123,8 +147,13 @@ def read_store(path: str | Path) -> xr.Dataset:
     if stored.nbytes > SHARE * free_bytes():
         problem = f"it takes {told(stored.nbytes)}, more than the memory that is free"
         raise DataFileError(path, problem, "Read parts of it by xarray.open_zarr.")
+    if names.pop(OF_ATTRS, [digest_of_attrs(stored.attrs)])[0] != digest_of_attrs(
+        stored.attrs
+    ):
+        problem = "they are not those that were written: their checksum differs"
+        raise DataFileError(path, problem, DAMAGED, column="attributes")
     for name in sorted(names.keys() | set(map(str, stored.variables))):
-        _load(path, stored, name, names.get(name))
+        _load(path, stored, name, names.get(name), group)
     return stored
 
 
@@ -139,7 +168,9 @@ def _unreadable(path: Path) -> str | None:
     return None
 
 
-def _load(path: Path, stored: xr.Dataset, name: str, written: list[str] | None) -> None:
+def _load(
+    path: Path, stored: xr.Dataset, name: str, written: list[str] | None, group: int
+) -> None:
     """Read a variable into memory if it is what was written."""
     place = f"variable {name}"
     if written is None or name not in stored.variables:
@@ -150,7 +181,7 @@ def _load(path: Path, stored: xr.Dataset, name: str, written: list[str] | None) 
             variable = stored.variables[name].load()
         if variable.dtype.kind in "OT":
             variable = variable.copy(data=variable.to_numpy().astype(str))
-        found = _digests(variable)
+        found = list(_digests(variable, {}, group).values())
     except FAULTS as error:
         problem = f"cannot be read: {first_line(error)}"
         raise DataFileError(path, problem, DAMAGED, column=place) from error
@@ -159,14 +190,15 @@ def _load(path: Path, stored: xr.Dataset, name: str, written: list[str] | None) 
         raise DataFileError(path, problem, DAMAGED, column=place)
 
 
-def _write_part(part: xr.Dataset, folder: Path, *, first: bool) -> None:
+def _write_part(part: xr.Dataset, folder: Path, first: Mapping[str, int] | None) -> None:
+    """Write a part at its place; without one, make the store of it."""
     encoded = part.copy()
     encoded.attrs = {}
     for name, variable in part.variables.items():
         encoded[name].attrs = encode(variable.attrs)
         encoded[name].encoding = {}
     with _quiet():
-        if first:
+        if first is None:
             encoding = {
                 name: {"chunks": _chunks(variable)}
                 for name, variable in encoded.variables.items()
@@ -176,8 +208,18 @@ def _write_part(part: xr.Dataset, folder: Path, *, first: bool) -> None:
                 folder, mode="w", zarr_format=3, consolidated=False, encoding=encoding
             )
             return
-        shared = [name for name, v in encoded.variables.items() if ALONG not in v.dims]
-        encoded.drop_vars(shared).to_zarr(folder, append_dim=ALONG, consolidated=False)
+        root = _zarr().open_group(folder, mode="r+")
+        for name, variable in encoded.variables.items():
+            if ALONG in variable.dims or WITHIN in variable.dims:
+                _put(root[str(name)], variable, first)
+
+
+def _put(array: Any, variable: xr.Variable, first: Mapping[str, int]) -> None:
+    """Write the values of a part into the array of all, which grows as it must."""
+    starts = [first.get(str(dim), 0) for dim in variable.dims]
+    ends = [start + size for start, size in zip(starts, variable.shape, strict=True)]
+    array.resize(tuple(map(max, zip(array.shape, ends, strict=True))))
+    array[tuple(map(slice, starts, ends))] = variable.to_numpy()
 
 
 def _chunks(variable: xr.Variable) -> tuple[int, ...]:
@@ -192,20 +234,32 @@ def _chunks(variable: xr.Variable) -> tuple[int, ...]:
     return tuple(chunks.values())
 
 
-def _digests(variable: xr.Variable) -> list[str]:
-    """Return the checksum of each direction, or of all where there are none."""
-    if ALONG not in variable.dims:
-        return [digest(variable)]
-    return [
-        digest(variable.isel({ALONG: slice(k, k + 1)}))
-        for k in range(variable.sizes[ALONG])
-    ]
+def _digests(
+    variable: xr.Variable, first: Mapping[str, int], group: int = 0
+) -> dict[tuple[int, ...], str]:
+    """Return checksums by place: of each direction, and each group of wavelengths."""
+    found = {}
+    sides = [(d, variable.sizes[d]) for d in (ALONG, WITHIN) if d in variable.dims]
+    steps = {ALONG: 1, WITHIN: group or max(variable.sizes.get(WITHIN, 1), 1)}
+    for place in product(*(range(0, size, steps[dim]) for dim, size in sides)):
+        own = {
+            dim: slice(k, k + steps[dim]) for (dim, _), k in zip(sides, place, strict=True)
+        }
+        key = tuple(k + first.get(dim, 0) for (dim, _), k in zip(sides, place, strict=True))
+        found[key] = digest(variable.isel(own))
+    return found
 
 
-def _joined(whole: dict[str, Any], part: dict[str, Any]) -> dict[str, Any]:
-    """Return attributes of directions and of those after them."""
+def _joined(whole: dict[str, Any], part: dict[str, Any], *, anew: bool) -> dict[str, Any]:
+    """Return attributes of directions and of those after them.
+
+    `anew` says whether the part begins directions, whose rays are counted once.
+    """
     joined = dict(whole)
     for name, value in part.items():
+        counted = name in _SUMMED or name.startswith("rays_")
+        if counted and not anew:
+            continue
         if name in _SUMMED:
             joined[name] = whole[name] + value
         elif name == "rel_error":
@@ -215,47 +269,6 @@ def _joined(whole: dict[str, Any], part: dict[str, Any]) -> dict[str, Any]:
         elif name.startswith("rays_") and isinstance(value, list):
             joined[name] = [*whole[name], *value]
     return joined
-
-
-def _check_folder(path: Path) -> None:
-    """Refuse a store with links, devices, foreign codecs or shapes beyond its files."""
-    size = 0
-    for number, entry in enumerate(chain([path], path.rglob("*"))):
-        mode = entry.lstat()
-        if number > _MOST_FILES or (number and stat.S_ISLNK(mode.st_mode)):
-            problem = f"{entry.name[:80]} is a link, or one of too many files"
-            raise DataFileError(path, problem, HOSTILE)
-        if not (stat.S_ISREG(mode.st_mode) or stat.S_ISDIR(mode.st_mode) or not number):
-            raise DataFileError(path, f"{entry.name[:80]} is no regular file", HOSTILE)
-        size += mode.st_size
-    for file in path.glob("*/zarr.json"):
-        about = _metadata(file)
-        place = f"variable {file.parent.name}"
-        try:
-            codecs = {str(one["name"]) for one in about["codecs"]}
-            count = float(np.prod([float(side) for side in about["shape"]]))
-        except (KeyError, TypeError, ValueError) as error:
-            problem = "its shape or its codecs are missing, or no such"
-            raise DataFileError(path, problem, DAMAGED, column=place) from error
-        if codecs - _CODECS or about.get("storage_transformers"):
-            problem = f"it is packed by {', '.join(sorted(codecs - _CODECS))[:80]}"
-            raise DataFileError(path, problem, HOSTILE, column=place)
-        if 8 * count > MOST_EXPANSION * size:
-            problem = f"it would take {told(8 * count)} of a store of {told(size)}"
-            raise DataFileError(path, problem, DAMAGED, column=place)
-
-
-def _metadata(file: Path) -> dict[str, Any]:
-    """Return what a zarr.json says, a mapping."""
-    if file.is_symlink() or not file.is_file() or file.stat().st_size > _MOST_METADATA:
-        raise DataFileError(file, "expected the description of a store", DAMAGED)
-    try:
-        found = json.loads(file.read_bytes())
-    except (ValueError, RecursionError) as error:
-        raise DataFileError(file, "is no JSON", DAMAGED) from error
-    if not isinstance(found, dict):
-        raise DataFileError(file, "is no description of a store", DAMAGED)
-    return found
 
 
 def _zarr() -> Any:

@@ -1,18 +1,26 @@
 """Result datasets in netCDF files, complete with their attributes."""
 
-import io
 import json
 import warnings
 from collections.abc import Hashable
 from pathlib import Path
 from typing import Any
 
+import h5netcdf
 import xarray as xr
+from xarray.backends import H5NetCDFStore
 
 import pbrdf.accessor  # noqa: F401  (registers ds.pbrdf)
-from data_io.reflectance.attributes import CHECKSUMS, decode, digest, encode
+from data_io.reflectance.attributes import (
+    CHECKSUMS,
+    OF_ATTRS,
+    decode,
+    digest,
+    digest_of_attrs,
+    encode,
+)
 from data_io.reflectance.result_store import read_store, write_store
-from data_io.reflectance.stored import FAULTS, check_stored, first_line
+from data_io.reflectance.stored import FAULTS, first_line, opened
 from data_io.text.files import read_bytes
 from pbrdf.errors import DataFileError
 from pbrdf.files import complete_file
@@ -67,9 +75,9 @@ def write_result(dataset: xr.Dataset, path: str | Path) -> None:
         for name, variable in dataset.data_vars.items()
         if variable.ndim and variable.dtype.kind in "fiu"
     }
-    encoded.attrs[CHECKSUMS] = json.dumps(
-        {str(name): digest(variable) for name, variable in encoded.variables.items()}
-    )
+    checksums = {str(name): digest(one) for name, one in encoded.variables.items()}
+    checksums[OF_ATTRS] = digest_of_attrs(encoded.attrs)
+    encoded.attrs[CHECKSUMS] = json.dumps(checksums)
     # In memory first: HDF5 takes the interpreter with it when the disk is full
     content = encoded.to_netcdf(engine="h5netcdf", encoding=encoding)
     with complete_file(path) as temporary:
@@ -93,14 +101,13 @@ def read_result(path: str | Path) -> xr.Dataset:
     if not content.startswith(_HDF5_MAGIC):
         problem = "expected a netCDF 4 file, the content is something else"
         raise DataFileError(path, problem, "Give a result file (.nc) of this program.")
-    check_stored(path, content)
     try:
         # Names of variables decide nothing: wavelength units are no times
         with (
             warnings.catch_warnings(action="ignore"),
-            xr.open_dataset(
-                io.BytesIO(content), engine="h5netcdf", decode_times=False
-            ) as stored,
+            opened(path, content) as file,
+            h5netcdf.File(file, "r") as inside,
+            xr.open_dataset(H5NetCDFStore(inside), decode_times=False) as stored,
         ):
             dataset = stored.load()
         _check_digests(path, dataset)
@@ -140,6 +147,10 @@ def _check_digests(path: str | Path, dataset: xr.Dataset) -> None:
     """
     written = json.loads(dataset.attrs.pop(CHECKSUMS, "{}"))
     cure = "The file is damaged; copy it again or repeat the run."
+    of_attrs = written.pop(OF_ATTRS, None)
+    if of_attrs is not None and of_attrs != digest_of_attrs(dataset.attrs):
+        problem = "they are not those that were written: their checksum differs"
+        raise DataFileError(path, problem, cure, column="attributes")
     for name, variable in dataset.variables.items():
         if written and written.get(str(name)) != digest(variable):
             problem = "the values are not those that were written: its checksum differs"

@@ -1,6 +1,7 @@
 """What an HDF5 file may hold before it is believed: no links outwards, bombs or holes."""
 
-import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
@@ -8,7 +9,7 @@ import numpy as np
 
 from pbrdf.errors import DataFileError
 
-__all__ = ["FAULTS", "check_stored", "first_line"]
+__all__ = ["FAULTS", "first_line", "opened"]
 
 # What the libraries below raise of damaged files
 FAULTS = (
@@ -23,10 +24,13 @@ FAULTS = (
     OverflowError,
     RecursionError,
     EOFError,
+    SystemError,
 )
 # A result may be so much larger than its file; noise compresses by less than two
 MOST_EXPANSION = 2000
 MOST_BYTES = 16 * 2**30
+# Name and version of a global heap
+_HEAP = b"GCOL\1\0\0\0"
 HOSTILE = "A result holds its own data; do not read it from a stranger."
 DAMAGED = "The file is damaged; copy it again or repeat the run."
 
@@ -37,22 +41,51 @@ def first_line(error: BaseException) -> str:
     return text.splitlines()[0][:150] if text else type(error).__name__
 
 
-def check_stored(path: str | Path, content: bytes) -> None:
-    """Refuse a file whose data lie elsewhere, are missing, or would fill the memory.
+@contextmanager
+def opened(path: str | Path, content: bytes) -> Iterator[h5py.File]:
+    """Open a file in memory; refuse one whose data lie elsewhere, are missing, or are many.
 
     Raises
     ------
     DataFileError
         Naming the variable.
     """
+    _check_heaps(path, content)
     try:
-        with h5py.File(io.BytesIO(content), "r") as file:
-            _check_group(path, file, len(content))
-    except DataFileError:
-        raise
+        file = h5py.File(h5py.h5f.open_file_image(content))
     except FAULTS as error:
         problem = f"expected a complete netCDF 4 file, got: {first_line(error)}"
         raise DataFileError(path, problem, "The file is truncated or damaged.") from error
+    with file:
+        try:
+            _check_group(path, file, len(content))
+        except DataFileError:
+            raise
+        except FAULTS as error:
+            problem = f"expected a complete netCDF 4 file, got: {first_line(error)}"
+            cure = "The file is truncated or damaged."
+            raise DataFileError(path, problem, cure) from error
+        yield file
+
+
+def _check_heaps(path: str | Path, content: bytes) -> None:
+    """Refuse tables of texts and references in which HDF5 would go round for ever.
+
+    HDF5 file format 3.0, III.E: 16 bytes of head with the size of the collection, then
+    objects with 16 bytes of head each; number 0 is what is free, its head counted in.
+    """
+    place = content.find(_HEAP)
+    while place >= 0:
+        end = place + int.from_bytes(content[place + 8 : place + 16], "little")
+        at = place + 16
+        while at + 16 <= min(end, len(content)):
+            number = int.from_bytes(content[at : at + 2], "little")
+            size = int.from_bytes(content[at + 8 : at + 16], "little")
+            step = 16 + -(-size // 8) * 8 if number else size
+            if not 16 <= step <= end - at:
+                raise DataFileError(path, "its table of texts is damaged", DAMAGED)
+            at += step
+        place = content.find(_HEAP, place + 4)
 
 
 def _check_group(path: str | Path, group: h5py.Group, size: int, depth: int = 0) -> None:

@@ -17,7 +17,7 @@ from data_io.topography.measurement_standard import (
     read_measurement_standard,
 )
 from data_io.topography.mesh_map import MESHES, read_mesh_map
-from data_io.topography.plausible import check_scale, with_spacing
+from data_io.topography.plausible import check_heights, check_scale, with_spacing
 from data_io.topography.sdf import is_text_sdf, read_text_sdf
 from data_io.topography.x3p import is_x3p, read_x3p_map
 from pbrdf.errors import DataFileError
@@ -112,7 +112,10 @@ def read_height_map(
     # What the caller says of its scale is the caller's to judge
     stated = not (spacing is None and unit is None and um_per_level is None)
     check_scale(path, found, stated=stated)
-    return mend_map(found, kinds=mend, name=path.name)
+    mended = mend_map(found, kinds=mend, name=path.name)
+    if mend != "none":
+        check_heights(path, mended.heights)
+    return mended
 
 
 def _read_any(
@@ -189,7 +192,10 @@ def _read_npy(path: Path, spacing: Spacing | None, unit: str | None) -> HeightMa
         problem = f"expected real heights, got dtype {rows.dtype}"
         raise DataFileError(path, problem, "Save a two-dimensional float array.")
     factor = unit_factor(unit or "um")
-    return build_map(path, rows.astype(np.float64) * factor, known_steps(path, spacing))
+    # A damaged number may be beyond all bounds, which `build_map` refuses by name
+    with np.errstate(over="ignore", invalid="ignore"):
+        heights = rows.astype(np.float64) * factor
+    return build_map(path, heights, known_steps(path, spacing))
 
 
 def _read_any_text(

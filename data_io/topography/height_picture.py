@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from data_io.micrograph.levels import check_pixels
+from data_io.micrograph.levels import check_pixels, decoded
 from data_io.text.files import read_bytes
 from pbrdf.errors import DataFileError
 
@@ -31,10 +31,8 @@ def read_height_picture(path: Path, um_per_level: float) -> np.ndarray:
         msg = f"um_per_level must be positive [um], got {um_per_level}. Give a height."
         raise ValueError(msg)
     check_pixels(path, len(read_bytes(path)))
-    from skimage import io
-
     try:
-        levels = np.asarray(io.imread(path))
+        levels = decoded(path)
     # Decoders of damaged pictures fail in every way there is
     except Exception as error:
         reason = " ".join(str(error).split())[:150] or type(error).__name__

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from data_io.micrograph.levels import unheard
 from data_io.text.files import NotAMapError
 from data_io.text.units import LENGTH_UNITS, normalise_unit, unit_factor
 from data_io.topography.channels import choose_channel
@@ -159,7 +160,7 @@ def is_park_tiff(path: Path) -> bool:
     import tifffile
 
     try:
-        with tifffile.TiffFile(path) as content:
+        with unheard(), tifffile.TiffFile(path) as content:
             tags = getattr(content.pages[0], "tags", ())
             return any(tag.code == _PARK_TAG for tag in tags)
     except _NO_TIFF:
@@ -188,7 +189,8 @@ def _faults(path: Path) -> Iterator[None]:
         with warnings.catch_warnings():
             # The hour of the measurement is of no concern
             warnings.filterwarnings("ignore", message="tzname")
-            yield
+            with unheard():
+                yield
     except DataFileError:
         raise
     # Forty parsers of damaged binary input fail in every way there is

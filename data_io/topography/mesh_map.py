@@ -2,17 +2,17 @@
 
 import warnings
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from data_io.text.files import read_bytes
+from data_io.topography.plausible import MOST_HEIGHT
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
+from pbrdf.surface.mesh.reading import read_mesh_file
 
 Array = np.ndarray
 
-MESHES = {".stl", ".ply", ".obj", ".off", ".glb", ".3mf"}
+MESHES = {".stl", ".ply", ".obj", ".off", ".glb"}
 # Pairs of triangles and nodes that are tested at once
 _MOST_PAIRS = 4_000_000
 _MOST_NODES = 50_000_000
@@ -47,19 +47,15 @@ def read_mesh_map(
     OverhangWarning
         If some nodes have several heights; it says how many.
     """
-    read_bytes(path)
-    import trimesh
-
+    raw = read_mesh_file(path)
     try:
-        mesh: Any = trimesh.load_mesh(path, process=False)
-        corners = np.asarray(mesh.triangles, dtype=np.float64) * size
-    # Parsers of many formats fail in every way there is
-    except Exception as error:
-        reason = " ".join(str(error).split())[:150] or type(error).__name__
-        problem = f"expected a mesh of triangles, got a fault on reading: {reason}"
+        corners = np.asarray(raw.vertices, dtype=np.float64)[raw.faces] * size
+    except IndexError as error:
+        problem = f"a face names a corner beyond the {len(raw.vertices)} there are"
         raise DataFileError(path, problem, "Export STL, PLY or OBJ again.") from error
-    if corners.shape[0] < 2 or not np.isfinite(corners).all():
-        problem = f"expected a mesh of triangles, got {corners.shape[0]}"
+    farthest = float(np.abs(corners).max())
+    if len(corners) < 2 or not farthest < MOST_HEIGHT:
+        problem = f"expected a mesh of triangles, got {len(corners)}, up to {farthest:g} um"
         raise DataFileError(path, problem, "Export STL, PLY or OBJ again.")
     points = np.unique(corners.reshape(-1, 3), axis=0)
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
@@ -133,12 +129,14 @@ def _heights(corners: Array, steps: Array, counts: Array) -> tuple[Array, Array]
         a, b, c = (scaled[triangle, k] for k in range(3))
         x, y = i - c[:, 0], j - c[:, 1]
         area = _cross(a - c, b - c)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        # Triangles that stand upright have no area; nothing lies inside of them
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             u = (x * (b - c)[:, 1] - y * (b - c)[:, 0]) / area
             v = ((a - c)[:, 0] * y - (a - c)[:, 1] * x) / area
-        inside = (u > -1e-6) & (v > -1e-6) & (u + v < 1 + 1e-6)
+            inside = (u > -1e-6) & (v > -1e-6) & (u + v < 1 + 1e-6)
         z = corners[triangle, :, 2]
-        height = u * z[:, 0] + v * z[:, 1] + (1 - u - v) * z[:, 2]
+        with np.errstate(invalid="ignore", over="ignore"):
+            height = u * z[:, 0] + v * z[:, 1] + (1 - u - v) * z[:, 2]
         where = (i[inside], j[inside])
         np.maximum.at(top, where, height[inside])
         np.minimum.at(bottom, where, height[inside])

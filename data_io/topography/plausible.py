@@ -23,6 +23,8 @@ _STEEPEST = 30.0
 _FLATTEST = 1e-9
 # Readers take a unit for another a thousand or a million times as large
 _FACTORS = (1e-3, 1e-6, 1e-9, 1e3, 1e6, 1e9)
+# Heights of a kilometre are none of a surface. [um]
+MOST_HEIGHT = 1e9
 
 
 def check_scale(path: str | Path, surface: HeightMap, *, stated: bool) -> HeightMap:
@@ -60,6 +62,21 @@ def check_scale(path: str | Path, surface: HeightMap, *, stated: bool) -> Height
         raise DataFileError(path, problem, cure)
     warnings.warn(f"{Path(path).name}: {problem}. {cure}", ScaleWarning, stacklevel=4)
     return surface
+
+
+def check_heights(path: str | Path, heights: np.ndarray) -> None:
+    """Refuse heights beyond a kilometre, which markers of missing points may have been.
+
+    Raises
+    ------
+    DataFileError
+        With the largest.
+    """
+    highest = float(np.nanmax(np.abs(heights), initial=0.0))
+    if highest > MOST_HEIGHT:
+        problem = f"expected heights of a surface, got {highest:.3g} um"
+        cure = "Check the unit (unit=); mark missing points with NaN."
+        raise DataFileError(path, problem, cure)
 
 
 def with_spacing(

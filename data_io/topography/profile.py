@@ -24,7 +24,7 @@ from data_io.topography.measurement_standard import (
     is_measurement_standard,
     read_measurement_standard,
 )
-from data_io.topography.plausible import check_profile_scale
+from data_io.topography.plausible import check_heights, check_profile_scale
 from data_io.topography.x3p import is_x3p, read_x3p
 from pbrdf.errors import DataFileError, real_array, require
 from pbrdf.files import complete_file
@@ -288,7 +288,10 @@ def read_profile(
     path = Path(path)
     found = _read_any(path, unit, columns, spacing, block)
     check_profile_scale(path, found.x, found.z)
-    return _mended(found, mend, path.name)
+    mended = _mended(found, mend, path.name)
+    if mend != "none":
+        check_heights(path, mended.z)
+    return mended
 
 
 def _read_any(

@@ -1,7 +1,6 @@
 """Elements of the Mueller BRDF, DOLP and AOLP of a result, each with its standard error."""
 
 import re
-import tomllib
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from pbrdf.errors import real_array
+from pbrdf.files.toml import tables_of
 
 __all__ = ["NAMES", "Element", "element", "folded", "light", "mueller", "stderr_of_light"]
 
@@ -179,10 +179,7 @@ def _isotropic(result: xr.Dataset) -> bool:
     """Whether the scene as the result records it looks the same from both sides."""
     if "isotropic" in result.attrs:
         return bool(result.attrs["isotropic"])
-    try:
-        scene = tomllib.loads(str(result.attrs.get("scene", "")))
-    except tomllib.TOMLDecodeError:
-        return False
+    scene = tables_of(str(result.attrs.get("scene", "")))
     surface = scene.get("surface", {})
     if surface.get("type") != "gaussian":
         return False

@@ -7,21 +7,34 @@ from typing import Any
 from pbrdf.errors import DataFileError
 from pbrdf.files.reading import read_bounded
 
-__all__ = ["read_toml"]
+__all__ = ["read_toml", "tables_of"]
 
 # A scene with its heights written out, and more
-MOST_BYTES = 64 * 2**20
+MOST_BYTES = MOST_TEXT = 64 * 2**20
 # The parser takes a time that grows with the square of their number
 MOST_DOTS = 500
+
+
+def tables_of(text: str) -> dict[str, Any]:
+    """Parse a text that another file holds; return no tables if it is no TOML."""
+    try:
+        return tomllib.loads(text[:MOST_TEXT]) if _dots(text) <= MOST_DOTS else {}
+    except (ValueError, OverflowError, RecursionError):
+        return {}
+
+
+def _dots(text: str) -> int:
+    """Count the dots in the keys of a text."""
+    return sum(
+        line.partition("=")[0].count(".") for line in text.splitlines() if "=" in line
+    )
 
 
 def read_toml(source: str | Path) -> dict[str, Any]:
     """Parse a TOML file, or raise a DataFileError that says what is wrong with it."""
     try:
         text = read_bounded(source, MOST_BYTES).decode("utf-8-sig")
-        dots = sum(
-            line.partition("=")[0].count(".") for line in text.splitlines() if "=" in line
-        )
+        dots = _dots(text)
         if dots > MOST_DOTS:
             problem = f"has {dots} dots in its keys, more than any file of this program"
             raise DataFileError(source, problem, "Write [tables] instead of dotted keys.")

@@ -10,6 +10,7 @@ import re
 import shutil
 import socket
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -101,9 +102,22 @@ def complete_folder(target: Path, *, replace: bool = False) -> Iterator[Path]:
         _put_folder(stage, target, replace=replace)
         _sync(target.parent)
     except OSError as error:
+        _clear(stage)
         raise _named(error, target) from error
-    finally:
+    except BaseException:
+        _clear(stage)
+        raise
+
+
+def _clear(stage: Path) -> None:
+    """Remove a folder that other threads of this process may still be writing to."""
+    gone = 0
+    for _ in range(100):
         shutil.rmtree(stage, ignore_errors=True)
+        gone = 0 if stage.exists() else gone + 1
+        if gone > 2:
+            return
+        time.sleep(0.02)
 
 
 def _named(error: OSError, target: Path) -> OSError:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from pbrdf.files.toml import tables_of
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -116,12 +118,7 @@ def title_of(result: xr.Dataset, *, also: Mapping[str, str] | None = None) -> st
 
 def scene_of(result: xr.Dataset) -> str:
     """Describe the scene of a result in a line, empty where it is not recorded."""
-    import tomllib
-
-    try:
-        scene = tomllib.loads(str(result.attrs.get("scene", "")))
-    except tomllib.TOMLDecodeError:
-        return ""
+    scene = tables_of(str(result.attrs.get("scene", "")))
     parts = []
     surface = scene.get("surface", {})
     if surface:

@@ -17,13 +17,12 @@ from pbrdf.surface import GaussianSurface
 from pbrdf.tracer import arguments
 from pbrdf.tracer.memory import NODE, PROGRAM, SHARE, Size, check_room, free_bytes
 
-__all__ = ["CURE", "OF_SIZE", "asked_size", "at_work", "check_run", "directions_at_once"]
+__all__ = ["CURE", "OF_SIZE", "asked_size", "at_once", "at_work", "check_run"]
 
 CURE = (
-    "Take fewer directions (theta_i=, phi_i=), wavelengths (wavelength=), bins (n_theta=, "
-    "n_dphi=), stokes='linear' or 'unpolarized'"
+    "Reduce theta_i=, phi_i=, wavelength=, n_theta= or n_dphi=, take stokes='unpolarized'"
 )
-_PARTS = "go direction by direction: -o name.zarr, or pbrdf.simulation.simulate_parts"
+_PARTS = "go part by part: -o name.zarr, or pbrdf.simulation.simulate_parts"
 # Arguments of `simulate` that say how large its result is, besides theta_i
 OF_SIZE = ("phi_i", "wavelength", "n_theta", "n_dphi", "stokes")
 # Rays and samples where a plan or a target error will say how many
@@ -95,6 +94,7 @@ def at_work(
     planned: bool,
     workers: int | None,
     looks: bool,
+    among: int | None = None,
 ) -> float:
     """Return the most that `simulate` takes at one time. [bytes]
 
@@ -111,6 +111,8 @@ def at_work(
         Whether there is a target error, and samples are as many as it takes.
     looks : bool
         Whether single bounces may come from looks at facets.
+    among : int, optional
+        How many wavelengths there are in all, if these are a part of them.
     """
     threads = arguments.worker_count(workers)
     rays = arguments.count("n_rays", n_rays or _RAYS, 1)
@@ -119,7 +121,7 @@ def at_work(
     samples = max(arguments.BATCHES, drawn) if batched else drawn
     samples = _MANY if planned else samples
     clean = not scene.contaminants and not getattr(scene.surface, "transparent", ())
-    spectral = clean and size.waves >= WORTHWHILE
+    spectral = clean and (among or size.waves) >= WORTHWHILE
     # Those traced, those that wait for the one before them, and the one that is added
     tallies = min(samples, 2 * threads + 1)
     # Means and scatters by bounces, the scatter of all together
@@ -141,7 +143,7 @@ def at_work(
     return max(held + surfaces, finished) + PROGRAM
 
 
-def directions_at_once(
+def at_once(
     scene: Scene,
     size: Size,
     *,
@@ -149,26 +151,35 @@ def directions_at_once(
     realizations: int | None,
     workers: int | None,
     looks: bool,
-) -> int:
-    """Return how many directions of the source fit into the memory that is free.
+) -> tuple[int, int]:
+    """Return how many directions of the source, and wavelengths, fit into free memory.
+
+    Fewer wavelengths than all only where not even one direction fits with all of them.
 
     Raises
     ------
     ValueError
-        If not even one does.
+        If not even one direction at one wavelength does.
     """
 
-    def need(angles: int) -> float:
+    def need(angles: int, waves: int) -> float:
+        part = replace(size, angles=angles, waves=waves)
         return at_work(
-            scene, replace(size, angles=angles), n_rays=n_rays, realizations=realizations,
-            planned=False, workers=workers, looks=looks,
-        ) + _sights(size)  # fmt: skip
+            scene, part, n_rays=n_rays, realizations=realizations, planned=False,
+            workers=workers, looks=looks, among=size.waves,
+        ) + _sights(part)  # fmt: skip
 
-    one, two = need(1), need(2)
-    check_room(one, replace(size, angles=1).words(), f"{CURE}, or fewer workers=.")
+    least = replace(size, angles=1, waves=1)
+    check_room(need(1, 1), least.words(), f"{CURE}, or fewer workers=.")
+    free = SHARE * free_bytes()
     # Beside a part the one that is being written
-    room = 0.5 * SHARE * free_bytes()
-    return max(1, min(size.angles, int(1 + (room - one) / (two - one))))
+    if need(1, size.waves) > free:
+        one, two = need(1, 1), need(1, 2)
+        fits = int(1 + (0.5 * free - one) / (two - one))
+        return 1, max(1, min(size.waves - 1, fits))
+    one, two = need(1, size.waves), need(2, size.waves)
+    fits = int(1 + (0.5 * free - one) / (two - one))
+    return max(1, min(size.angles, fits)), size.waves
 
 
 def _tally(size: Size, materials: int, rays: int | None) -> float:

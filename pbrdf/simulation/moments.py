@@ -43,7 +43,8 @@ class Moments:
         self._scatter_total = np.zeros(shape[:2] + shape[3:])
         self._lit = np.zeros((shape[0], *shape[2:5]), dtype=bool)
         self._matrix = np.empty(plan.n_stokes**2)
-        parts = min(MOST_PARTS, len(plan.n) // PER_PART) if plan.spectrum else 0
+        most = max(len(plan.n) // PER_PART, 1)
+        parts = min(MOST_PARTS, most) if plan.spectrum else 0
         self._parts = [_Part.of(plan, *ends) for ends in _cut(len(plan.n), parts)]
         self._albedo: list[np.ndarray] = []
         self._energy: list[np.ndarray] = []
@@ -119,7 +120,7 @@ class Moments:
         """
         counts = self._by_class()
         albedo = np.mean(self._albedo, axis=0)
-        one = np.where(counts > 0, albedo / np.maximum(counts, 1), np.nan)
+        one = np.where(counts > 0, albedo / np.where(counts > 0, counts, 1.0), np.nan)
         for order in range(1, one.shape[2]):
             one[..., order] = _or_else(one[..., order], one[..., order - 1])
         for order in reversed(range(one.shape[2] - 1)):
@@ -131,8 +132,9 @@ class Moments:
         return one
 
     def _by_class(self) -> np.ndarray:
-        """Count escaped paths (angles, 1, bounces)."""
-        return self.counts[:, None, shading.N_ORDERS : shading.N_MISMATCH]
+        """Count escaped paths of a wavelength (angles, 1, bounces)."""
+        counts = self.counts[:, None, shading.N_ORDERS : shading.N_MISMATCH]
+        return counts / self.plan.walks
 
     def _one_of_all(self) -> np.ndarray:
         """Return the same for all bounces together (angles, wavelengths)."""

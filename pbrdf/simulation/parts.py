@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from pbrdf.scene.scene import Scene
-from pbrdf.simulation.memory import OF_SIZE, asked_size, check_run, directions_at_once
+from pbrdf.simulation import memory
+from pbrdf.simulation.memory import OF_SIZE, asked_size, check_run
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.results import judged_before, labelled
 from pbrdf.simulation.run import planned, prepared, simulate, traced, wants_looks
@@ -23,12 +25,19 @@ __all__ = ["simulate_parts", "simulate_together"]
 
 
 def simulate_parts(
-    scene: Scene, theta_i: npt.ArrayLike, *, at_once: int | None = None, **options: Any
+    scene: Scene,
+    theta_i: npt.ArrayLike,
+    *,
+    at_once: int | None = None,
+    waves_at_once: int | None = None,
+    **options: Any,
 ) -> Iterator[xr.Dataset]:
     """Simulate some directions after others: for results that do not fit into memory.
 
     Put together along theta_i they are what `simulate` gives, bit for bit; attributes are
-    those of each part. Realisations are drawn anew for each part.
+    those of each part. Where one direction does not fit, its wavelengths come in groups,
+    one group after another before the next direction. Realisations are drawn, and rays
+    traced, anew for each part.
 
     Parameters
     ----------
@@ -36,6 +45,8 @@ def simulate_parts(
         As of `simulate`.
     at_once : int, optional
         Directions of a part; as many as fit into the free memory by default.
+    waves_at_once : int, optional
+        Wavelengths of a part; all of them by default, or as many as fit.
     **options
         What `simulate` takes but target_rel_error, which is reached by all directions
         together.
@@ -43,11 +54,12 @@ def simulate_parts(
     Yields
     ------
     xarray.Dataset
+        Its `encoding["first"]` holds the places of its first direction and wavelength.
 
     Raises
     ------
     TypeError, ValueError
-        As `simulate`, or if not even one direction fits.
+        As `simulate`, or if not even one direction fits at one wavelength.
 
     Examples
     --------
@@ -68,17 +80,23 @@ def simulate_parts(
         raise ValueError(msg)
     size = asked_size(theta_i, **{name: given[name] for name in OF_SIZE})
     if at_once is None:
-        at_once = directions_at_once(
+        at_once, fitting = memory.at_once(
             scene, size, n_rays=given["n_rays"], realizations=given["realizations"],
             workers=given["workers"], looks=given["variance_reduction"],
         )  # fmt: skip
+        waves_at_once = waves_at_once or fitting
     at_once = arguments.count("at_once", at_once, 1)
+    by_waves = arguments.count("waves_at_once", waves_at_once or size.waves, 1)
     ready = prepared(whole=False, **given)
-    starts = range(0, size.angles, at_once)
-    for number, first in enumerate(starts):
+    starts = list(product(range(0, size.angles, at_once), range(0, size.waves, by_waves)))
+    for number, (first, wave) in enumerate(starts):
         part = ready.part(first, min(first + at_once, size.angles))
+        if by_waves < size.waves:
+            part = part.of_waves(wave, min(wave + by_waves, size.waves))
         told = _told(given["progress"], number, len(starts))
-        yield traced(replace(part, run=replace(part.run, progress=told)))
+        made = traced(replace(part, run=replace(part.run, progress=told)))
+        made.encoding["first"] = {"theta_i": first, "wavelength": wave}
+        yield made
 
 
 def _told(

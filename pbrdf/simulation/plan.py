@@ -85,6 +85,11 @@ class Plan:
         """Whether a ray may come apart, so that only a part of it is lost sideways."""
         return self.base.shape[1] > 0 or self.media is not None
 
+    @property
+    def walks(self) -> int:
+        """How often a ray is followed: for each wavelength where light is refracted."""
+        return 1 if self.media is None else len(self.n)
+
     @cached_property
     def spectrum(self) -> Spectrum | None:
         """What many wavelengths over one set of paths share; None for few."""
@@ -110,6 +115,20 @@ class Plan:
         )
         shared = self.spectrum
         other.__dict__["spectrum"] = shared and shared.part(first, last)
+        return other
+
+    def of_waves(self, first: int, last: int) -> "Plan":
+        """Return the plan of some wavelengths, which share what all of them share."""
+        own = slice(first, last)
+        media = self.media
+        if media is not None:
+            parts = {name: part[own] for name, part in media._asdict().items()}
+            media = Media(**(parts | {"black": media.black}))
+        other = replace(
+            self, n=self.n[own], kappa=self.kappa[own], base=self.base[own], media=media
+        )
+        shared = self.spectrum
+        other.__dict__["spectrum"] = shared and shared.of_waves(first, last)
         return other
 
     @property

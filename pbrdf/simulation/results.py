@@ -132,7 +132,8 @@ def _estimates(moments: Moments) -> dict[str, np.ndarray]:
         "truncated": energy[..., TRUNCATED],
         "leaked": energy[..., LEAKED],
         "left_sideways": energy[..., SIDEWAYS],
-        "side_exits": moments.counts[:, N_SIDE] / (plan.n_rays * moments.samples),
+        "side_exits": moments.counts[:, N_SIDE]
+        / (plan.n_rays * plan.walks * moments.samples),
     }
 
 
@@ -204,16 +205,16 @@ def _missing_light(moments: Sequence[Moments]) -> list[str]:
     """Warnings of rays lost, and of light that leaked or left sideways."""
     first = moments[0]
     lost = sum(int(one.counts[:, N_LEAKED].sum()) for one in moments)
-    rays = first.plan.n_rays * first.samples * len(first.plan.theta_i) * len(moments)
+    rays = first.plan.n_rays * first.plan.walks * first.samples
     energy = np.max([one.energy() for one in moments], axis=0)
     aside = np.max([one.counts[:, N_SIDE] for one in moments], axis=0)
     shares = {
         "leaked": energy[..., LEAKED],
         "left_sideways": energy[..., SIDEWAYS],
-        "side_exits": aside / (first.plan.n_rays * first.samples),
+        "side_exits": aside / rays,
     }
     plan = first.plan
-    found = lost_ray_warnings(lost, rays)
+    found = lost_ray_warnings(lost, rays * len(first.plan.theta_i) * len(moments))
     if found:
         del shares["leaked"]  # said already
     return found + lost_light_warnings(shares, plan.theta_i, plan.max_bounces)

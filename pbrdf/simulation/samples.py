@@ -50,6 +50,18 @@ class Ready:
         plans = [plan.part(first, last) for plan in self.plans]
         return replace(self, run=run, plans=plans, single=single)
 
+    def of_waves(self, first: int, last: int) -> "Ready":
+        """Return the run of some of the wavelengths, over the same rays."""
+        run, own = self.run, slice(first, last)
+        waves = None if run.waves is None else np.atleast_1d(run.waves)[own]
+        run = replace(
+            run, root=copy.deepcopy(run.root), waves=waves, n=run.n[own],
+            kappa=run.kappa[own], base=run.base[own],
+        )  # fmt: skip
+        plans = [plan.of_waves(first, last) for plan in self.plans]
+        single = self.single and [one.of_waves(first, last) for one in self.single]
+        return replace(self, run=run, plans=plans, single=single)
+
 
 def trace_samples(
     run: Run, plans: Sequence[Plan], single: Singles

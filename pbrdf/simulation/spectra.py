@@ -91,6 +91,11 @@ class Spectrum:
         """Return what some of the directions share."""
         return replace(self, bins=self.bins[first:last], sizes=self.sizes[first:last])
 
+    def of_waves(self, first: int, last: int) -> "Spectrum":
+        """Return what some of the wavelengths share: the bins of all."""
+        table = FresnelTable(*(part[first:last] for part in self.table))
+        return replace(self, table=table)
+
     def room(self, index: int, max_bounces: int) -> kernel.Spectra:
         """Empty sums and buffer for incident direction `index` of samples."""
         return kernel.Spectra(

@@ -11,7 +11,7 @@ from typing import Any
 
 from pbrdf._version import __version__
 from pbrdf.errors import DataFileError
-from pbrdf.files import read_toml
+from pbrdf.files import companion, read_toml
 from pbrdf.scene.read import scene_of
 from pbrdf.scene.scene import Scene
 from pbrdf.sweeps.designs import Axis, Design
@@ -159,7 +159,7 @@ def load_sweep(path: str | Path) -> Sweep:
         if document or not isinstance(scene, str):
             problem = "'scene' must name a scene file, and no other scene may stand beside"
             raise DataFileError(source, problem, "Keep one of them.")
-        source = source.parent / scene
+        source = companion(source, scene, "scene")
         document = read_toml(source)
     try:
         return sweep_of(document, source, _flat(vary), simulate, design)

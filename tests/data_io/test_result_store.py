@@ -12,6 +12,7 @@ import xarray as xr
 
 import pbrdf
 import pbrdf.simulation.memory
+import pbrdf.simulation.parts
 from data_io import is_result_store, read_result, write_result
 from data_io.reflectance.result_store import write_store
 from pbrdf.cli import main
@@ -73,6 +74,40 @@ def test_parts_are_put_together(tmp_path):
     together = read_result(tmp_path / "r.zarr")
     xr.testing.assert_identical(together.drop_attrs(), small().drop_attrs())
     assert together.attrs == small().attrs | {"path_segments": 40}
+
+
+def test_groups_of_wavelengths_are_put_together(tmp_path):
+    rng = np.random.default_rng(3)
+    sides = {"bounces": 3, "theta_i": 4, "wavelength": 5, "dphi": 2}
+    whole = xr.Dataset(
+        {
+            "brdf": (tuple(sides), rng.standard_normal(tuple(sides.values()))),
+            "albedo": (("theta_i", "wavelength"), rng.standard_normal((4, 5))),
+            "seen": ("theta_i", np.arange(4.0)),
+            "weight": ("dphi", np.ones(2)),
+        },
+        coords={"theta_i": np.arange(4.0), "wavelength": np.linspace(0.4, 0.8, 5)},
+        attrs={"path_segments": 10, "warnings": []},
+    )
+    parts = []
+    for row, wave in [(0, 0), (0, 2), (0, 4), (3, 0), (3, 2), (3, 4)]:
+        part = whole.isel(theta_i=slice(row, row + 3), wavelength=slice(wave, wave + 2))
+        part.encoding["first"] = {"theta_i": row, "wavelength": wave}
+        parts.append(part)
+    write_store(parts, tmp_path / "r.zarr")
+    together = read_result(tmp_path / "r.zarr")
+    xr.testing.assert_identical(together.drop_attrs(), whole.drop_attrs())
+    # Rays of a direction are counted once, not once a group
+    assert together.attrs["path_segments"] == 20
+    for name in ("brdf", "albedo", "seen", "wavelength"):
+        chunk = max(
+            path for path in (tmp_path / "r.zarr" / name / "c").rglob("*") if path.is_file()
+        )
+        content = chunk.read_bytes()
+        chunk.write_bytes(content[:-3])
+        with pytest.raises(DataFileError, match=f"variable {name}:"):
+            read_result(tmp_path / "r.zarr")
+        chunk.write_bytes(content)
 
 
 def test_a_failure_leaves_nothing(tmp_path):
@@ -182,7 +217,7 @@ def test_simulate_writes_a_store_as_it_writes_a_file(folder, monkeypatch, capsys
     run = ["simulate", "scene.toml", *ANGLES, *FEW, "-o"]
     assert main([*run, "r.nc"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    monkeypatch.setattr("pbrdf.simulation.parts.directions_at_once", lambda *_, **__: 1)
+    monkeypatch.setattr(pbrdf.simulation.memory, "at_once", lambda *_, **__: (1, 1))
     assert main([*run, "r.zarr"]) == 0
     assert capsys.readouterr().out.splitlines()[:-1] == lines[:-1]
     file, store = read_result("r.nc"), read_result("r.zarr")
@@ -207,6 +242,41 @@ def test_a_store_takes_what_no_memory_holds(folder, monkeypatch, capsys):
     assert main([*run, "-o", "r.zarr"]) == 0
     monkeypatch.undo()
     assert read_result(folder / "r.zarr").sizes["theta_i"] == 12
+
+
+def test_a_store_takes_wavelengths_that_no_memory_holds(folder, monkeypatch, capsys):
+    """Not one direction fits with all of them."""
+    size = memory.Size(angles=1, azimuths=1, waves=60, bins=30 * 30, n_stokes=4)
+    need = pbrdf.simulation.memory.at_work(
+        pbrdf.load_scene("scene.toml"), size, n_rays=1000, realizations=8, planned=False,
+        workers=1, looks=True,
+    )  # fmt: skip
+    waves = np.linspace(0.4, 0.8, 60)
+    run = ["simulate", "scene.toml", "--n-theta", "30", "--n-dphi", "30", "--realizations",
+           "8", "--n-rays", "1000", "--theta-i-deg", "10,50", "--workers", "1",
+           "--wavelength-um", ",".join(f"{wave:.4f}" for wave in waves)]  # fmt: skip
+    assert main([*run, "-o", "r.nc"]) == 0
+    parts = []
+    traced = pbrdf.simulation.parts.traced
+
+    def seen(ready):
+        parts.append((len(ready.plans[0].theta_i), len(ready.plans[0].n)))
+        return traced(ready)
+
+    monkeypatch.setattr("pbrdf.simulation.parts.traced", seen)
+    for module in (memory, pbrdf.simulation.memory):
+        monkeypatch.setattr(module, "free_bytes", lambda: 0.99 * need / memory.SHARE)
+    assert main([*run, "-o", "s.nc"]) == 2
+    assert "-o name.zarr" in capsys.readouterr().err
+    assert main([*run, "-o", "r.zarr"]) == 0
+    monkeypatch.undo()
+    assert {angles for angles, _ in parts} == {1}
+    assert 2 < len(parts) < 60
+    assert sum(count for _, count in parts) == 2 * 60
+    xr.testing.assert_identical(
+        read_result(folder / "r.nc").drop_attrs(),
+        read_result(folder / "r.zarr").drop_attrs(),
+    )
 
 
 @pytest.mark.filterwarnings("ignore::pbrdf.errors.AccuracyWarning")

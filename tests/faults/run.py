@@ -3,7 +3,11 @@
     python tests/faults/run.py [--kills 50] [--twins 20] [--disks 10]
 
 - kills: SIGKILL or SIGTERM at a random moment of simulate (file and store), sweep, dew and
-  pipeline --quick; the output is whole or not there, and the next run leaves no leftover.
+  pipeline --quick: half of them at any moment, half when the folder has just changed for
+  the k-th time, k at random. The output is whole or not there, SIGTERM leaves nothing
+  behind, and after the next run nothing but inputs and output is there. Runs are forks of
+  this process, which has loaded all that they need, so that kills meet the work and not the
+  imports; every tenth run is a process of its own.
 - twins: two runs into one output; exactly one wins, the other ends with code 2.
 - disks: results written to full disks of several sizes; one line and code 1, Python lives.
   Disks are small file systems in memory where mounting is allowed, else a limit of the
@@ -22,8 +26,10 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager, redirect_stdout, suppress
 from pathlib import Path
+
+from pbrdf.cli import main as main_of_commands
 
 SCENE = """
 [surface]
@@ -48,7 +54,11 @@ COMMANDS = {
          "-o", "out.nc"],
         "out.nc",
     ),
-    "dew": (["dew", "--n-rays", "1000", "--runs", "4", "-o", "out"], "out"),
+    "dew": (
+        ["dew", "--scene", "scene.toml", "--contact-angles-deg", "90", "--n-rays", "1000",
+         "--runs", "4", "-o", "out"],
+        "out",
+    ),
     "pipeline": (
         ["pipeline", "surface.csv", "scan.csv", "--n", "1.5", "--quick", "-o", "out"], "out"
     ),
@@ -92,13 +102,79 @@ def whole(path: Path) -> bool:
     return (path / "model.toml").is_file()
 
 
-def kill(name: str, rng: random.Random, folder: Path, longest: float) -> str:
+def held(folder: Path) -> list[tuple[str, int]]:
+    """Names and sizes of all that stands in a folder at the moment."""
+    found = []
+    for place, _, names in os.walk(folder):
+        found.append((place, 0))
+        for name in names:
+            with suppress(OSError):
+                path = os.path.join(place, name)  # noqa: PTH118  (quick)
+                found.append((path, os.stat(path).st_size))  # noqa: PTH116
+    return sorted(found)
+
+
+def wait_for_change(run: "subprocess.Popen | Fork", folder: Path, number: int) -> int:
+    """Wait until the folder has changed so often, or the run ends; return the count."""
+    earlier, count = held(folder), 0
+    while count < number and run.poll() is None:
+        now = held(folder)
+        count += now != earlier
+        earlier = now
+        time.sleep(0.0005)
+    return count
+
+
+class Fork:
+    """A command in a fork of this process: no import to wait for."""
+
+    def __init__(self, words: list[str], folder: Path) -> None:
+        self.returncode: int | None = None
+        self.said = tempfile.TemporaryFile("w+")  # noqa: SIM115  (lives as long as this)
+        self.pid = os.fork()
+        if self.pid:
+            return
+        code = 70
+        try:
+            os.chdir(folder)
+            quiet = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(quiet, 1)
+            os.dup2(self.said.fileno(), 2)
+            code = main_of_commands(["--quiet", *words])
+        finally:
+            os._exit(code)
+
+    def poll(self) -> int | None:
+        """Return the exit code, or minus the signal, once it has ended."""
+        if self.returncode is None:
+            pid, status = os.waitpid(self.pid, os.WNOHANG)
+            self.returncode = os.waitstatus_to_exitcode(status) if pid else None
+        return self.returncode
+
+    def send_signal(self, number: int) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def communicate(self) -> tuple[None, str]:
+        while self.poll() is None:
+            time.sleep(0.002)
+        self.said.seek(0)
+        return None, self.said.read()
+
+
+def kill(
+    name: str, rng: random.Random, longest: float, changes: int, cold: bool, folder: Path
+) -> str:
     """Kill a run at a random moment; say what is wrong, or "fine"."""
     words, output = COMMANDS[name]
     inputs = prepare(folder)
     how = rng.choice([signal.SIGKILL, signal.SIGTERM])
-    run = command(words, folder)
-    time.sleep(rng.uniform(0.0, longest))
+    begin = command if cold else Fork
+    run = begin(words, folder)
+    if rng.random() < 0.5:
+        time.sleep(rng.uniform(0.0, longest))
+    else:
+        wait_for_change(run, folder, rng.randint(1, max(4 * changes // 5, 1)))
     run.send_signal(how)
     run.communicate()
     target = folder / output
@@ -106,12 +182,18 @@ def kill(name: str, rng: random.Random, folder: Path, longest: float) -> str:
         return "a partial output"
     if run.returncode not in (0, -how, 143):
         return f"code {run.returncode}"
-    again = command([*words, "--force"], folder)
+    left = {path.name for path in folder.iterdir()} - inputs - {output}
+    if left and how == signal.SIGTERM:
+        return f"SIGTERM leaves {sorted(left)[:2]}"
+    ended = "too late" if run.returncode == 0 else how.name
+    again = begin([*words, "--force"], folder)
     said = again.communicate()[1]
     if again.returncode:
         return f"the next run failed: {said[-100:]}"
     left = {path.name for path in folder.iterdir()} - inputs - {output}
-    return f"leftovers {sorted(left)[:2]}" if left or not whole(target) else "fine"
+    if left or not whole(target):
+        return f"leftovers {sorted(left)[:2]}"
+    return f"fine ({ended})"
 
 
 def twins(name: str, folder: Path) -> str:
@@ -195,7 +277,7 @@ def main() -> int:
     parser.add_argument("--command", choices=COMMANDS, action="append")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    rng, bad = random.Random(given.seed), 0
+    bad = 0
     chosen = given.command or list(COMMANDS)
 
     def tell(kind: str, found: Counter) -> int:
@@ -205,31 +287,48 @@ def main() -> int:
         good = ("fine", "written", "refused")
         return sum(n for said, n in found.items() if not said.startswith(good))
 
-    for name in chosen:
-        longest = 1.2 * seconds(name)
+    for name in chosen if given.kills else ():
+        with tempfile.TemporaryDirectory() as folder:
+            longest, changes = measured(name, Path(folder))
+        start = time.perf_counter()
         kills = (
-            trial(lambda f, n=name, s=longest: kill(n, rng, f, s))
-            for _ in range(given.kills)
-        )
+            trial(
+                kill, name, random.Random(f"{given.seed} {k}"), 1.1 * longest, changes,
+                k % 10 == 9,
+            )
+            for k in range(given.kills)
+        )  # fmt: skip
         bad += tell(f"kills, {name}", Counter(kills))
+        print(
+            f"    {longest:.1f} s and {changes} changes of the folder a run; "
+            f"{time.perf_counter() - start:.0f} s in all",
+            flush=True,
+        )
     pairs = Counter(trial(twins, chosen[k % len(chosen)]) for k in range(given.twins))
-    bad += tell("twins", pairs)
-    for name in [name for name in chosen if name in SHORT]:
-        sizes = SIZES[-given.disks :] if given.disks else ()
+    bad += tell("twins", pairs) if given.twins else 0
+    for name in [name for name in chosen if name in SHORT and given.disks]:
+        sizes = SIZES[-given.disks :]
         bad += tell(f"disks, {name}", Counter(trial(full_disk, name, kib) for kib in sizes))
     return int(bad > 0)
 
 
-def seconds(name: str) -> float:
-    """Return how long a command takes here. [s]"""
-    with tempfile.TemporaryDirectory() as folder:
-        prepare(Path(folder))
-        start = time.perf_counter()
-        run = command(COMMANDS[name][0], Path(folder), env=os.environ)
-        said = run.communicate()[1]
-        if run.returncode:
-            raise RuntimeError(said)
-        return time.perf_counter() - start
+def measured(name: str, folder: Path) -> tuple[float, int]:
+    """Return how long a command takes here [s], and how often the folder changes.
+
+    It is run in this process first, which then has loaded all that forks of it need.
+    """
+    prepare(folder)
+    words = COMMANDS[name][0]
+    with chdir(folder), redirect_stdout(None):
+        if main_of_commands(["--quiet", *words]):
+            msg = f"{name} fails"
+            raise RuntimeError(msg)
+    start = time.perf_counter()
+    run = Fork([*words, "--force"], folder)
+    changes = wait_for_change(run, folder, sys.maxsize)
+    if run.returncode:
+        raise RuntimeError(run.communicate()[1])
+    return time.perf_counter() - start, changes
 
 
 if __name__ == "__main__":

@@ -3,8 +3,11 @@
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -65,6 +68,34 @@ def test_of_two_folders_exactly_one_wins(tmp_path):
         found = sorted(pool.map(write, range(4)))
     assert found[1:] == ["late"] * 3
     assert names(tmp_path) == ["out"]
+
+
+def test_an_interrupted_folder_is_cleared_though_threads_still_write(tmp_path):
+    """Zarr writes by threads of its own, which an interrupt does not stop."""
+    ready, ends = threading.Event(), time.monotonic() + 0.2
+
+    def write(stage: Path) -> None:
+        for k in count():
+            place = stage / f"d{k % 7}"
+            with suppress(OSError):
+                place.mkdir(parents=True, exist_ok=True)
+                (place / f"f{k}").write_bytes(b"x")
+            ready.set()
+            if time.monotonic() > ends:
+                return
+
+    def interrupted() -> None:
+        with complete_folder(tmp_path / "out") as stage:
+            threads.append(threading.Thread(target=write, args=(stage,)))
+            threads[0].start()
+            ready.wait()
+            raise KeyboardInterrupt
+
+    threads: list[threading.Thread] = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    threads[0].join()
+    assert names(tmp_path) == []
 
 
 def test_a_link_of_a_guessed_name_is_not_followed(tmp_path):

@@ -2,9 +2,8 @@
 
 import pytest
 
-from tests.fuzz.good_files import READERS
 from tests.fuzz.kept import check
-from tests.fuzz.run import run
+from tests.fuzz.run import READERS, run
 
 
 @pytest.mark.parametrize("name", READERS)

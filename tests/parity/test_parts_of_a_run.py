@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import pbrdf
 from pbrdf.errors import AccuracyWarning
@@ -42,6 +43,11 @@ RUNS = {
     "one surface": (pbrdf.Scene(rough(0.3), GLASS), {"realizations": 1, "n_rays": 320}),
 }  # fmt: skip
 
+FEW = (
+    pbrdf.Scene(rough(0.3).sample(1), pbrdf.Material(1.5, diffuse_albedo=0.3)),
+    {"wavelength": [0.5, 0.6, 0.7], "phi_i": [0.0, 1.0]},
+)
+
 
 @pytest.mark.filterwarnings("ignore::pbrdf.errors.AccuracyWarning")
 @pytest.mark.parametrize("name", RUNS)
@@ -57,6 +63,38 @@ def test_parts_are_those_of_the_whole(name):
             put = np.concatenate([p[variable].values for p in parts], dims.index("theta_i"))
             np.testing.assert_array_equal(put, whole[variable].values, str(variable))
     assert sum(p.attrs["path_segments"] for p in parts) == whole.attrs["path_segments"]
+
+
+@pytest.mark.filterwarnings("ignore::pbrdf.errors.AccuracyWarning")
+@pytest.mark.parametrize("name", ["looks", "spectrum", "few over a map", "drops"])
+def test_wavelengths_apart_are_those_of_the_whole(name):
+    scene, given = RUNS.get(name, FEW)
+    if name == "drops":
+        given = {**given, "wavelength": [0.5, 0.55, 0.7]}
+    given = {"n_theta": 9, "n_dphi": 12, "n_rays": 640, "workers": 2, **given}
+    whole = pbrdf.simulate(scene, ANGLES[:3], **given)
+    waves = whole.sizes["wavelength"]
+    by = 1 if waves < 4 else 4
+    parts = list(simulate_parts(scene, ANGLES[:3], at_once=2, waves_at_once=by, **given))
+    groups = -(-waves // by)
+    assert len(parts) == 2 * groups
+    assert parts[1].encoding["first"] == {"theta_i": 0, "wavelength": by}
+    for variable in whole.variables:
+        rows = [
+            joined(parts[groups * k : groups * (k + 1)], variable, "wavelength")
+            for k in (0, 1)
+        ]
+        put = rows[0]
+        if "theta_i" in put.dims:
+            put = xr.Variable.concat(rows, "theta_i").transpose(*put.dims)
+        np.testing.assert_array_equal(put, whole[variable].values, str(variable))
+
+
+def joined(parts, name, dim):
+    first = parts[0][name].variable
+    if dim not in first.dims:
+        return first
+    return xr.Variable.concat([p[name].variable for p in parts], dim).transpose(*first.dims)
 
 
 def test_a_target_is_for_all_directions_together():

@@ -107,7 +107,7 @@ def _check_file(directions: Any, size: dict[str, Any]) -> None:
     from pbrdf.tracer.memory import check_room, stored
 
     asked = asked_size(directions, **size)
-    cure = f"{CURE}, or write it direction by direction, -o name.zarr."
+    cure = f"{CURE}, or write it part by part, -o name.zarr."
     check_room(stored(asked), f"{asked.words()}, written to netCDF", cure)
 
 

@@ -124,6 +124,13 @@ class SingleBounce:
         """Return those of some directions."""
         return replace(self, directions=self.directions[first:last], among=self)
 
+    def of_waves(self, first: int, last: int) -> "SingleBounce":
+        """Return those of some wavelengths; facets are seen alike at all."""
+        directions = tuple(
+            replace(one, light=one.light[first:last]) for one in self.directions
+        )
+        return replace(self, directions=directions)
+
     @classmethod
     def of(cls, surface: GaussianSurface, plan: Plan) -> "SingleBounce":
         """Integrate over the slope law for every direction and wavelength of a plan."""

@@ -170,6 +170,12 @@ class BesideBodies:
             light=self.light[here], wanted=self.wanted[here],
         )  # fmt: skip
 
+    def of_waves(self, first: int, last: int) -> "BesideBodies":
+        """Return those of some wavelengths; facets are seen alike at all."""
+        return replace(
+            self, single=self.single.of_waves(first, last), light=self.light[:, first:last]
+        )
+
     def explanation(self) -> list[str]:
         """Say what is known beforehand of single bounces."""
         return [

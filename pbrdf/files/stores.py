@@ -1,0 +1,84 @@
+"""Zarr stores, folders of chunks, checked before anything in them is believed."""
+
+import json
+import stat
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbrdf.errors import DataFileError
+
+__all__ = ["check_store", "description"]
+
+# What this program writes; others might run anything, or fetch data from elsewhere
+_CODECS = {"bytes", "zstd", "vlen-utf8", "crc32c"}
+_MOST_FILES, _MOST_METADATA = 200_000, 16 * 2**20
+# A variable may be so much larger than the store
+_MOST_EXPANSION = 2000
+_HOSTILE = "A result holds its own data; do not read it from a stranger."
+_DAMAGED = "The file is damaged; copy it again or repeat the run."
+
+
+def check_store(path: Path, *, sparse: bool = False) -> None:
+    """Refuse a store with links, devices, foreign codecs or shapes beyond its files.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+    sparse : bool
+        Whether most of it may be missing, as of a sweep that is not finished.
+
+    Raises
+    ------
+    DataFileError
+        Naming the variable.
+    """
+    size = 0
+    for number, entry in enumerate(chain([path], path.rglob("*"))):
+        mode = entry.lstat()
+        if number > _MOST_FILES or (number and stat.S_ISLNK(mode.st_mode)):
+            problem = f"{entry.name[:80]} is a link, or one of too many files"
+            raise DataFileError(path, problem, _HOSTILE)
+        if not (stat.S_ISREG(mode.st_mode) or stat.S_ISDIR(mode.st_mode) or not number):
+            raise DataFileError(path, f"{entry.name[:80]} is no regular file", _HOSTILE)
+        size += mode.st_size
+    for file in path.glob("*/zarr.json"):
+        about = description(path, f"{file.parent.name}/zarr.json")
+        place = f"variable {file.parent.name}"
+        try:
+            codecs = {str(one["name"]) for one in about["codecs"]}
+            count = float(np.prod([float(side) for side in about["shape"]]))
+        except (KeyError, TypeError, ValueError) as error:
+            problem = "its shape or its codecs are missing, or no such"
+            raise DataFileError(path, problem, _DAMAGED, column=place) from error
+        if codecs - _CODECS or about.get("storage_transformers"):
+            problem = f"it is packed by {', '.join(sorted(codecs - _CODECS))[:80]}"
+            raise DataFileError(path, problem, _HOSTILE, column=place)
+        if not sparse and 8 * count > _MOST_EXPANSION * size:
+            problem = (
+                f"it would take {8 * count / 2**20:.0f} MiB of a store of {size} bytes"
+            )
+            raise DataFileError(path, problem, _DAMAGED, column=place)
+
+
+def description(store: Path, place: str = "zarr.json") -> dict[str, Any]:
+    """Return what a file of a store says of it or of a variable, a mapping.
+
+    Raises
+    ------
+    DataFileError
+        If it is no such file, or holds anything else.
+    """
+    file = store / place
+    if file.is_symlink() or not file.is_file() or file.stat().st_size > _MOST_METADATA:
+        raise DataFileError(store, f"{place} is not there, or no file", _DAMAGED)
+    try:
+        found = json.loads(file.read_bytes())
+    except (ValueError, RecursionError) as error:
+        raise DataFileError(store, f"{place} is no JSON", _DAMAGED) from error
+    if not isinstance(found, dict):
+        raise DataFileError(store, f"{place} describes nothing", _DAMAGED)
+    return found
