@@ -18,7 +18,7 @@ def check(found: Any, path: Path) -> str | None:
     """Return what is wrong with a scan or with constants, None if nothing is."""
     if isinstance(found, Material):
         return _constants(found)
-    if isinstance(found, xr.Dataset) and "theta_i" in found.coords:
+    if isinstance(found, xr.Dataset) and "geometry" in found.dims:
         return _physics(found) or _lines(found, path)
     return None
 
