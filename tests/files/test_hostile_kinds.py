@@ -135,7 +135,7 @@ def refused(path: Path, read) -> None:
     assert time.process_time() - start < 5.0
     assert peak() - before < 2**30
     assert path.name in str(caught.value)
-    assert len(str(caught.value)) < 500
+    assert len(str(caught.value)) <= 320
 
 
 def peak() -> int:
