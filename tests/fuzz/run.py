@@ -156,7 +156,7 @@ def attempt(read: Callable[[Path], Any], path: Path) -> tuple[str, Any]:
         said, found = "refused", str(error)
         if len(found) > LONGEST or "\n" in found:
             said = f"a message of {len(found)} signs: {found[:80]} ... {found[-60:]}"
-        elif path.name not in found:
+        elif not any(one.name in found for one in path.parent.iterdir()):
             said = f"a message without the file: {found}"
     except Exception as error:  # what must not get out is the question
         place = traceback.extract_tb(error.__traceback__)[-1]
