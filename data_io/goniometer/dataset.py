@@ -47,6 +47,7 @@ def to_dataset(scan: Scan) -> xr.Dataset:
         for name, values in scan.values.items()
     }
     attrs: dict[str, object] = {
+        "repeated_rows": len(scan.dphi) - len(keep),
         "source": scan.path.name,
         "sha256": sha256(scan.path.read_bytes()).hexdigest(),
         "conventions": CONVENTIONS,

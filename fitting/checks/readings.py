@@ -115,7 +115,16 @@ def check_noise(curves: Sequence[Curve]) -> list[Finding]:
 
 
 def check_repeats(scan: "xr.Dataset") -> list[Finding]:
-    """Count geometries that stand more than once."""
+    """Count geometries that stand more than once, or did in the file."""
+    same = int(scan.attrs.get("repeated_rows", 0))
+    found = []
+    if same:
+        found.append(
+            Finding(
+                name="repeated", severity="note",
+                what=f"rows that repeat a geometry with the same values count once: {same}",
+            )
+        )  # fmt: skip
     names = [
         n for n in ("theta_i", "theta_s", "dphi", "phi_i", "wavelength") if n in scan.coords
     ]
@@ -123,16 +132,16 @@ def check_repeats(scan: "xr.Dataset") -> list[Finding]:
     columns = [np.broadcast_to(np.asarray(scan[n].values, float), (size,)) for n in names]
     keys = np.rint(np.nan_to_num(np.column_stack(columns)) * 1e7)
     repeats = size - len(np.unique(keys, axis=0))
-    if not repeats:
-        return []
-    return [
-        Finding(
-            name="duplicates", severity="warning",
-            what=f"{repeats} readings repeat a geometry",
-            suspects="repeated measurements, or a file joined twice",
-            cure="Average repeats into one row with its standard error.",
-        )
-    ]  # fmt: skip
+    if repeats:
+        found.append(
+            Finding(
+                name="duplicates", severity="warning",
+                what=f"{repeats} readings repeat a geometry",
+                suspects="repeated measurements, or a file joined twice",
+                cure="Average repeats into one row with its standard error.",
+            )
+        )  # fmt: skip
+    return found
 
 
 def check_wavelengths(scan: "xr.Dataset") -> list[Finding]:

@@ -235,6 +235,17 @@ def test_the_command_exits_by_what_it_finds(capsys):
     assert "0.8999" in capsys.readouterr().out
 
 
+def test_rows_that_repeat_each_other_are_counted(tmp_path):
+    lines = (CASES / "good.csv").read_text().splitlines()
+    path = tmp_path / "twice.csv"
+    path.write_text("\n".join([*lines, *lines[-2:]]) + "\n")
+    scan = read_goniometer(path)
+    assert scan.sizes == read_goniometer(CASES / "good.csv").sizes
+    (finding,) = [f for f in check_scan(scan) if f.name == "repeated"]
+    assert finding.what.endswith("count once: 2")
+    assert not [f for f in check_scan(scan) if f.name == "duplicates"]
+
+
 def test_numbers_stand_alone_on_standard_output(capsys, tmp_path):
     flipped = str(CASES / "flipped.csv")
     assert main(["check", str(CASES / "good.csv"), flipped, "--json", "-"]) == 1
