@@ -1,17 +1,21 @@
 """All compiled code of the package: numbers in, numbers out.
 
 Kernels know no strings, files, units or frames other than those of the conventions page.
-`jit` compiles them and keeps the result on disk, see `pbrdf.kernels.caching`.
+`jit` compiles them and keeps the result on disk, see `pbrdf.kernels.caching`. Those with
+`forceinline` are parts of other kernels and get no entry from Python, which would make up
+a quarter of the time it takes to compile them all; `from_python` makes one.
 """
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numba
+from numba.core.dispatcher import Dispatcher
 
 from pbrdf.kernels.caching import cache_folder, keeping, kernel_sources
 
-__all__ = ["cache_folder", "compiled_callback", "jit", "kernel_sources"]
+__all__ = ["cache_folder", "compiled_callback", "from_python", "jit", "kernel_sources"]
 
 
 def jit(
@@ -28,7 +32,38 @@ def jit(
     settings: Any = {"nogil": True, "error_model": "numpy"} | options
     if not allocates:
         settings["_nrt"] = False
-    return keeping(lambda keep: numba.njit(cache=keep, **settings)(function))
+    inner = settings.get("forceinline", False)
+    if inner:
+        settings |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    kernel = keeping(lambda keep: numba.njit(cache=keep, **settings)(function))
+    if inner and isinstance(kernel, Dispatcher):
+        _close_to_python(kernel)
+    return kernel
+
+
+def _close_to_python(kernel: Any) -> None:
+    """Refuse calls from Python of a kernel that has no entry: Numba would jump to 0."""
+
+    def refuse(*_: Any, **__: Any) -> None:
+        msg = (
+            f"{kernel.py_func.__qualname__} is compiled into other kernels only. To call "
+            "it from Python, make an entry with pbrdf.kernels.from_python."
+        )
+        raise TypeError(msg)
+
+    def add_overload(result: Any) -> None:
+        kernel.overloads[tuple(result.signature.args)] = result
+
+    # Numba asks for these whenever no compiled entry fits the arguments
+    kernel._compile_for_args = refuse
+    kernel.add_overload = add_overload
+
+
+@cache
+def from_python(kernel: Any) -> Any:
+    """Return a part of other kernels as one that Python can call, not kept on disk."""
+    function = getattr(kernel, "py_func", kernel)
+    return numba.njit(nogil=True, error_model="numpy")(function)
 
 
 def compiled_callback(function: Callable[..., Any], signature: Any) -> Any:

@@ -8,9 +8,13 @@ from scipy.special import erfc
 
 from pbrdf import GaussianSurface, Material, MicrofacetModel
 from pbrdf.analytic import SLOPE_DISTRIBUTIONS, SlopeTable
+from pbrdf.kernels import from_python
 from pbrdf.kernels.microfacet import slopes as laws
 from pbrdf.kernels.microfacet.facet import directions
 from pbrdf.kernels.microfacet.shadowing import combined_overhangs
+
+directions = from_python(directions)
+combined_overhangs = from_python(combined_overhangs)
 
 MIRROR = Material.mirror()
 
@@ -54,7 +58,7 @@ def test_exponential_law_has_the_named_rms_along_each_axis(slope):
     values = density("exponential", radius, 1.0) / np.prod(slope)
     share = values / values.sum()
     assert_allclose(np.sqrt((share * x[:, None] ** 2).sum()), slope[0], rtol=2e-3)
-    centre = laws.radial_density(rough, 0.0)
+    centre = from_python(laws.radial_density)(rough, 0.0)
     assert_allclose(centre, 3 / (2 * np.pi * np.prod(slope)), rtol=1e-12)
 
 
@@ -75,7 +79,7 @@ def test_overhang_is_the_mean_excess_of_slopes(law, slope):
         pieces = [
             quad(ring, a, b, limit=200)[0] for a, b in ((cot, cot + 4), (cot + 4, np.inf))
         ]
-        actual = laws.mean_overhang(rough, np.cos(theta), np.sin(theta), slope)
+        actual = from_python(laws.mean_overhang)(rough, np.cos(theta), np.sin(theta), slope)
         assert_allclose(actual, sum(pieces) / cot, rtol=2e-4, atol=1e-9)
 
 
@@ -163,6 +167,6 @@ def test_what_a_table_cannot_be_is_refused():
 def test_a_law_or_rule_without_a_formula_gives_no_number():
     """Registered in the tables but not in the kernels: nan, never another law's number."""
     rough = laws.Roughness(99, 0.3, 0.3, True, 1.0)
-    assert np.isnan(laws.radial_density(rough, 0.1))
+    assert np.isnan(from_python(laws.radial_density)(rough, 0.1))
     way = directions(0.9, 0.7, 2.0, 1.0, 0.0)
     assert np.isnan(combined_overhangs(99, way, 0.1, 0.2))

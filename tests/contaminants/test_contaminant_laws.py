@@ -18,11 +18,14 @@ from pbrdf import (
 )
 from pbrdf.contaminants.bodies import Bodies as Placed
 from pbrdf.contaminants.bodies import Placement
+from pbrdf.kernels import from_python
 from pbrdf.kernels.bodies.bodies import Bodies, body_interval
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.media import media_of
 from pbrdf.tracer.wet_field import world_of
 from tests.contaminants.scenes import assert_closed, clean_counters
+
+body_interval = from_python(body_interval)
 
 WATER, OIL, GLASS = Material(1.333), Material(1.47), Material(1.6)
 PAINT = Material(1.5, diffuse_albedo=0.3)

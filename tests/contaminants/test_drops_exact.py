@@ -10,11 +10,14 @@ from numpy.testing import assert_allclose
 from pbrdf import Drops, HeightMap, Material, Scene, Spheres, simulate
 from pbrdf.conventions import detector_bins
 from pbrdf.errors import AccuracyWarning
+from pbrdf.kernels import from_python
 from pbrdf.kernels.bodies.beams import KX, KY, KZ, N_STATE
 from pbrdf.kernels.bodies.interfaces import refract_beam
 from pbrdf.kernels.optics.vectors import Vec
 from tests.contaminants.scenes import assert_closed, assert_within, clean_counters
 from tests.reference_optics import fresnel, path_mueller
+
+refract_beam = from_python(refract_beam)
 
 WATER = Material(1.333)
 REFERENCE = Path(__file__).parents[1] / "reference"

@@ -12,12 +12,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
 from pbrdf.errors import AccuracyWarning
-from pbrdf.kernels import jit
+from pbrdf.kernels import from_python, jit
 from pbrdf.kernels.terrain.embree import first_face
 from pbrdf.kernels.terrain.heightfield import HIT, walk
 from pbrdf.tracer import embree
 from pbrdf.tracer.embree import library as load_embree
 from pbrdf.tracer.field import Field
+
+walk = from_python(walk)
 
 ANGLES = np.deg2rad([10.0, 60.0, 85.0])
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from pbrdf.kernels import kernel_sources
+from pbrdf.kernels import from_python, kernel_sources
+from pbrdf.kernels.optics.vectors import Vec, dot
 
 ROOT = Path(__file__).parents[2]
 
@@ -152,3 +153,14 @@ def test_processes_that_start_at_once_compile_each_kernel_once(tmp_path: Path) -
     # Four processes, three kinds of argument
     assert sum(int(misses) for _, misses in first) == 3
     assert sum(int(misses) for _, misses in second) == 0
+
+
+def test_a_part_of_other_kernels_refuses_python_and_gets_an_entry():
+    """Without an entry Numba would jump to address 0."""
+    place = Vec(0.2, -0.3, 0.9)
+    with pytest.raises(TypeError, match="dot is compiled into other kernels only"):
+        dot(place, place)
+    # Also once it has been compiled into one that Python may call
+    assert from_python(dot)(place, place) == pytest.approx(0.94)
+    with pytest.raises(TypeError, match="from_python"):
+        dot(place, place)

@@ -5,6 +5,7 @@ import pytest
 import trimesh
 
 from pbrdf import Material, MeshSurface, Scene
+from pbrdf.kernels import from_python
 from pbrdf.kernels.bodies.beams import (
     FACET,
     INDEX,
@@ -31,6 +32,13 @@ from pbrdf.kernels.paths.random import Draw
 from pbrdf.tracer.media import clear_materials, covering_materials, media_of
 from pbrdf.tracer.wet_mesh import WetMesh
 from tests.meshes.shapes import SlowMesh, joined, pair, plate
+
+# Parts of other kernels, with entries of their own
+next_event = from_python(next_event)
+move_beam = from_python(move_beam)
+solid_at = from_python(solid_at)
+meet_solid = from_python(meet_solid)
+meet_interface = from_python(meet_interface)
 
 # A ray this near an edge may go either way in float32, and all after it [um]
 UNSURE = 3e-5

@@ -5,9 +5,15 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from pbrdf import GaussianSurface, HeightMap
+from pbrdf.kernels import from_python
 from pbrdf.kernels.terrain.heightfield import ESCAPED, corner_heights, facet_steps, walk
 from pbrdf.kernels.terrain.horizon import build_horizon, is_free
 from pbrdf.tracer.field import Field
+
+is_free = from_python(is_free)
+facet_steps = from_python(facet_steps)
+corner_heights = from_python(corner_heights)
+walk = from_python(walk)
 
 RNG = np.random.default_rng(8)
 SMOOTH = GaussianSurface(

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import GaussianSurface, HeightMap, Material, Scene, simulate
+from pbrdf.kernels import from_python
 from pbrdf.kernels.bins import bin_fits
 from pbrdf.kernels.optics import fresnel_table
 from pbrdf.kernels.optics.fresnel import reflection_elements
@@ -120,9 +121,10 @@ def test_few_wavelengths_are_shaded_path_by_path():
     ("n", "kappa"), [*zip(N, KAPPA, strict=True), (np.inf, 0.0), (1.0, 0.0), (0.2, 3.0)]
 )
 def test_table_holds_its_tolerance_wherever_it_is_read(n, kappa):
+    table_elements = from_python(fresnel_table.table_elements)
     table = fresnel_table.build_table(np.array([[n]]), np.array([[kappa]]))
     for cos_beta in np.random.default_rng(1).random(3000) ** 2:
-        found = fresnel_table.table_elements(table, 0, 0, cos_beta)
+        found = table_elements(table, 0, 0, cos_beta)
         exact = reflection_elements(cos_beta, n, kappa)
         # A quarter more than in the middle of a step, where the table was judged
         assert np.abs(np.subtract(found, exact)).max() <= 1.25e-8 * exact[0]
@@ -134,6 +136,7 @@ def test_two_bounces_in_closed_form_equal_the_product_of_matrices(n_stokes):
     optics = shading.Optics(
         np.array([[1.5, 0.96]]), np.array([[0.0, 6.7]]), np.empty((1, 0)), n_stokes
     )
+    path_mueller = from_python(shading.path_mueller)
     for _ in range(50):
         record = np.zeros((3, 1, shading.N_RECORD))
         turn = rng.uniform(0, 2 * np.pi, 3)
@@ -145,7 +148,7 @@ def test_two_bounces_in_closed_form_equal_the_product_of_matrices(n_stokes):
         record[:, 0, shading.COS_OUT] = shading.SPECULAR
         record[:2, 0, shading.LABEL] = rng.permutation(2)
         closed, product = np.zeros((4, 4)), np.zeros((4, 4))
-        shading.path_mueller(record, 0, 2, 0, optics, n_stokes, closed)
+        path_mueller(record, 0, 2, 0, optics, n_stokes, closed)
         shading.reflect_often(record, 0, 2, 0, optics, n_stokes, product)
         assert_allclose(
             closed[:n_stokes, :n_stokes], product[:n_stokes, :n_stokes], atol=1e-15

@@ -7,9 +7,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from pbrdf import HeightMap
+from pbrdf.kernels import from_python
 from pbrdf.kernels.terrain.heightfield import ESCAPED, HIT, SIDE, block_maxima, walk
 from pbrdf.tracer.field import Field
 from tests.brute_force import intersect
+
+walk = from_python(walk)
 
 STEPS = 100_000
 # A place is known to so many cells, a time to so many times its scale

@@ -69,7 +69,7 @@ def slope_norm(law, slope_x, slope_y):
         root = sqrt(abs(gap) + TINY)
         atanh = 0.5 * log((1.0 + root) / abs(1.0 - root))
         wide = atan2(root, 1.0)
-        mean = select(gap > 0.0, atanh / root - 1.0, 1.0 - wide / root) / abs(gap)
+        mean = select(gap > 0.0, atanh / root - 1.0, 1.0 - wide / root) / (abs(gap) + TINY)
         # Both forms are 0/0 at variance 1: the series there
         series = 1.0 / 3.0 + gap * (
             0.2 + gap * (1.0 / 7.0 + gap * (1.0 / 9.0 + gap / 11.0))
