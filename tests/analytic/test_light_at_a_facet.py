@@ -69,6 +69,16 @@ def test_a_turn_is_the_matrix_of_the_conventions():
     assert_allclose(turned(c2, s2, *along), [1.0, 0.0], atol=1e-13)
 
 
+def test_head_on_the_frame_stays_whatever_the_length_of_the_axes():
+    """Below 1e-14 of the length of s the new axis is rounding."""
+    s = np.cross([0.2, 0.5, 0.1], DOWN)
+    s *= 1000.0 / np.linalg.norm(s)
+    new = rotation(DOWN, 0.4) @ s / 1000.0
+    assert turn_frame(vec(DOWN), vec(s), vec(3e-15 * new)) == (1.0, 0.0)
+    found = turn_frame(vec(DOWN), vec(s), vec(3e-14 * new))
+    assert_allclose(found, [np.cos(0.8), np.sin(0.8)], rtol=1e-13)
+
+
 def test_light_through_a_base_keeps_the_polarisation_of_its_way_out_only():
     into = np.array([[0.8, 0.1, 0, 0], [0.1, 0.8, 0, 0], [0, 0, 0.7, 0], [0, 0, 0, 0.7]])
     out = np.array([[0.6, -0.2, 0, 0], [-0.2, 0.6, 0, 0], [0, 0, 0.5, 0], [0, 0, 0, 0.5]])
