@@ -48,6 +48,29 @@ def test_direction_correlated_hiding_off_azimuth_zero(dphi):
     assert_allclose(factor, 1 / (1 + high + weight * low), rtol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("shadowing", "combined"),
+    [
+        ("smith-correlated", lambda a, b: 1 / (1 + a + b)),
+        ("smith-uncorrelated", lambda a, b: 1 / ((1 + a) * (1 + b))),
+    ],
+)
+@pytest.mark.parametrize("dphi", [0.4, 2.1, -1.2])
+def test_each_direction_is_hidden_by_the_slope_along_it(shadowing, combined, dphi):
+    """Slopes 0.2 along x and 0.5 along y; along a direction their projections add."""
+    phi_i, theta_i, theta_s = 0.7, 1.2, 1.05
+    model = MicrofacetModel(Material(1.5), slope_rms=(0.2, 0.5), shadowing=shadowing)
+    light, bare = (
+        one.brdf(theta_i, theta_s, dphi, phi_i=phi_i)[0, 0]
+        for one in (model, model.with_parameters(shadowing="none"))
+    )
+    hidden = [
+        smith_lambda(theta, math.hypot(0.2 * math.cos(phi), 0.5 * math.sin(phi)))
+        for theta, phi in ((theta_i, phi_i), (theta_s, phi_i + dphi))
+    ]
+    assert_allclose(light / bare, combined(*hidden), rtol=1e-9)
+
+
 @pytest.mark.parametrize("cosine", [0.95, 0.5, 0.2])
 @pytest.mark.parametrize("index", [(1.4, 0.6), (0.2, 3.1)])
 def test_light_that_enters_an_absorber_keeps_the_phases_of_its_field(cosine, index):

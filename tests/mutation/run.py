@@ -38,6 +38,13 @@ PRELOADED = ("numpy", "scipy.integrate", "scipy.special", "numba", "pandas", "xa
 NAMED = (
     (SHADOWING, "4.41 * azimuth + 1.0", "4.41 * azimuth + 2.0", "hiding"),
     (SHADOWING, "return 4.41", "return 4.0", "hiding"),
+    (SHADOWING, "sin_dphi = 2.0 *", "sin_dphi = 2.2 *", "slope_along"),
+    (
+        SHADOWING,
+        "return 1.0 / (1.0 + lambda_i",
+        "return 1.0 / (1.1 + lambda_i",
+        "slope_along",
+    ),
     (SLOPES, "0.2 + gap", "0.3 + gap", "cauchy"),
     (SLOPES, "series = 1.0 / 3.0 + gap", "series = 1.0 / 3.0 - gap", "cauchy"),
     (SCATTER, "= rise**2 @ weight", "= 0.5 * rise**2 @ weight", "isserlis"),
