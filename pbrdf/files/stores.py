@@ -38,7 +38,11 @@ def check_store(path: Path, *, sparse: bool = False) -> None:
     """
     size = 0
     for number, entry in enumerate(chain([path], path.rglob("*"))):
-        mode = entry.lstat()
+        try:
+            mode = entry.lstat()
+        except FileNotFoundError:
+            # A sweep that is running has moved it to its place
+            continue
         if number > _MOST_FILES or (number and stat.S_ISLNK(mode.st_mode)):
             problem = f"{entry.name[:80]} is a link, or one of too many files"
             raise DataFileError(path, problem, _HOSTILE)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pbrdf.files.stores import check_store
 from pbrdf.stored.parameters import Cloud, Parameter
 
 __all__ = ["Contents", "Parameter", "open_contents"]
@@ -167,8 +168,10 @@ def _opened(path: Path) -> xr.Dataset:
     from pbrdf.sweeps.wanted import needed
 
     needed("zarr")
+    if path.is_dir():
+        check_store(path, sparse=True)
     try:
-        dataset = xr.open_zarr(path, chunks=None)
+        dataset = xr.open_zarr(path, chunks=None, consolidated=False)
         bound = _BOUND in dataset.attrs
     except (OSError, ValueError, KeyError):
         bound = False

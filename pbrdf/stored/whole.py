@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from pbrdf.files.stores import check_store
+
 __all__ = ["is_sweep_store", "read_sweep"]
 
 _BOUND = "pbrdf_sweep"
@@ -53,7 +55,8 @@ def read_sweep(path: str | Path, most_bytes: float = 2e8) -> xr.Dataset:
             f"path must be a store of pbrdf sweep, got {path}. Give its folder, NAME.zarr."
         )
         raise ValueError(msg)
-    stored = xr.open_zarr(path, chunks=None)
+    check_store(Path(path), sparse=True)
+    stored = xr.open_zarr(path, chunks=None, consolidated=False)
     state = stored.state.load()
     swept = [str(d) for d in state.dims]
     point = sum(v.nbytes for v in stored.data_vars.values()) / max(state.size, 1)

@@ -1,5 +1,6 @@
 """A store of a sweep as a BRDF: at its nodes, between them, and beyond."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import xarray as xr
 from numpy.testing import assert_allclose
 
 import pbrdf
+from pbrdf.errors import DataFileError
+from pbrdf.stored import read_sweep
 from pbrdf.sweeps import load_sweep, run_sweep
 from tests.stored.conftest import SCENE, SWEEP
 
@@ -243,3 +246,19 @@ def test_a_point_is_exported_and_plotted(store: Path, tmp_path: Path) -> None:
     assert main(["export", str(store), "-o", str(file), "--force"]) == 2
     figure = pbrdf.from_store(store).plot(0.5, slope_rms=0.2, n=1.55)
     assert len(figure.axes) >= 3
+
+
+@pytest.mark.parametrize("opened", [pbrdf.from_store, read_sweep])
+def test_stores_from_strangers_are_looked_at_first(store, tmp_path, opened):
+    """Codecs run code of their choice, and links lead to other files."""
+    foreign = shutil.copytree(store, tmp_path / "foreign.zarr")
+    about = foreign / "brdf_total" / "zarr.json"
+    held = json.loads(about.read_text())
+    held["codecs"][-1]["name"] = "numcodecs.lzma"
+    about.write_text(json.dumps(held))
+    with pytest.raises(DataFileError, match=r"brdf_total: it is packed by numcodecs\.lzma"):
+        opened(foreign)
+    linked = shutil.copytree(store, tmp_path / "linked.zarr")
+    next(linked.glob("brdf_total/c/**/0")).parent.joinpath("1000").symlink_to("/etc/passwd")
+    with pytest.raises(DataFileError, match="1000 is a link"):
+        opened(linked)
