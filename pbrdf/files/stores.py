@@ -2,6 +2,7 @@
 
 import json
 import stat
+from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -49,9 +50,8 @@ def check_store(path: Path, *, sparse: bool = False) -> None:
         if not (stat.S_ISREG(mode.st_mode) or stat.S_ISDIR(mode.st_mode) or not number):
             raise DataFileError(path, f"{entry.name[:80]} is no regular file", _HOSTILE)
         size += mode.st_size
-    for file in path.glob("*/zarr.json"):
-        about = description(path, f"{file.parent.name}/zarr.json")
-        place = f"variable {file.parent.name}"
+    for name, about in _variables(path):
+        place = f"variable {name[:80]}"
         try:
             codecs = {str(one["name"]) for one in about["codecs"]}
             count = float(np.prod([float(side) for side in about["shape"]]))
@@ -66,6 +66,21 @@ def check_store(path: Path, *, sparse: bool = False) -> None:
                 f"it would take {8 * count / 2**20:.0f} MiB of a store of {size} bytes"
             )
             raise DataFileError(path, problem, _DAMAGED, column=place)
+
+
+def _variables(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield what a store says of each variable: beside it, and together at its root."""
+    for file in path.glob("*/zarr.json"):
+        yield file.parent.name, description(path, f"{file.parent.name}/zarr.json")
+    root = description(path) if (path / "zarr.json").exists() else {}
+    together = root.get("consolidated_metadata") or {}
+    held = together.get("metadata", {}) if isinstance(together, dict) else None
+    if not isinstance(held, dict) or not all(isinstance(v, dict) for v in held.values()):
+        problem = "what its root says of its variables is no table"
+        raise DataFileError(path, problem, _DAMAGED)
+    for name, about in held.items():
+        if about.get("node_type") != "group":
+            yield str(name), about
 
 
 def description(store: Path, place: str = "zarr.json") -> dict[str, Any]:

@@ -171,7 +171,7 @@ def _opened(path: Path) -> xr.Dataset:
     if path.is_dir():
         check_store(path, sparse=True)
     try:
-        dataset = xr.open_zarr(path, chunks=None, consolidated=False)
+        dataset = xr.open_zarr(path, chunks=None)
         bound = _BOUND in dataset.attrs
     except (OSError, ValueError, KeyError):
         bound = False

@@ -56,7 +56,7 @@ def read_sweep(path: str | Path, most_bytes: float = 2e8) -> xr.Dataset:
         )
         raise ValueError(msg)
     check_store(Path(path), sparse=True)
-    stored = xr.open_zarr(path, chunks=None, consolidated=False)
+    stored = xr.open_zarr(path, chunks=None)
     state = stored.state.load()
     swept = [str(d) for d in state.dims]
     point = sum(v.nbytes for v in stored.data_vars.values()) / max(state.size, 1)

@@ -258,6 +258,12 @@ def test_stores_from_strangers_are_looked_at_first(store, tmp_path, opened):
     about.write_text(json.dumps(held))
     with pytest.raises(DataFileError, match=r"brdf_total: it is packed by numcodecs\.lzma"):
         opened(foreign)
+    together = shutil.copytree(store, tmp_path / "together.zarr")
+    held = json.loads((together / "zarr.json").read_text())
+    held["consolidated_metadata"]["metadata"]["brdf_total"]["codecs"][-1]["name"] = "x"
+    (together / "zarr.json").write_text(json.dumps(held))
+    with pytest.raises(DataFileError, match=r"brdf_total: it is packed by x"):
+        opened(together)
     linked = shutil.copytree(store, tmp_path / "linked.zarr")
     next(linked.glob("brdf_total/c/**/0")).parent.joinpath("1000").symlink_to("/etc/passwd")
     with pytest.raises(DataFileError, match="1000 is a link"):
