@@ -22,9 +22,9 @@ from data_io.reflectance.attributes import (
     digest_of_attrs,
     encode,
 )
-from data_io.reflectance.stored import DAMAGED, FAULTS, first_line
 from pbrdf.errors import DataFileError
 from pbrdf.files import complete_folder
+from pbrdf.files.hdf5 import DAMAGED, FAULTS, first_line
 from pbrdf.files.stores import check_store, description
 from pbrdf.files.writing import ExistsError
 from pbrdf.tracer.memory import SHARE, free_bytes, told

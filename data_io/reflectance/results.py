@@ -20,10 +20,10 @@ from data_io.reflectance.attributes import (
     encode,
 )
 from data_io.reflectance.result_store import read_store, write_store
-from data_io.reflectance.stored import FAULTS, first_line, opened
 from data_io.text.files import read_bytes
 from pbrdf.errors import DataFileError
 from pbrdf.files import complete_file
+from pbrdf.files.hdf5 import FAULTS, first_line, opened
 
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 

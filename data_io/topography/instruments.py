@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from data_io.micrograph.levels import unheard
@@ -20,6 +21,8 @@ from data_io.topography.channels import choose_channel
 from data_io.topography.plausible import ScaleWarning, check_scale, with_spacing
 from data_io.topography.sur import plain_sur
 from pbrdf.errors import DataFileError
+from pbrdf.files import read_bounded
+from pbrdf.files.hdf5 import opened
 from pbrdf.surface.heightmap import HeightMap
 
 # Binary formats that may hold a profile as well
@@ -178,6 +181,10 @@ def _open(path: Path) -> Any:
         problem = f"expected a text, .npy or .x3p file, got {path.suffix or 'no extension'}"
         cure = "For instrument formats install the extra: pip install 'pbrdf[formats]'."
         raise DataFileError(path, problem, cure) from error
+    if h5py.is_hdf5(path):
+        # Its data could lie in any file that can be read here
+        with opened(path, read_bounded(path)):
+            pass
     with _faults(path):
         return SurfaceTopography.open_topography(plain_sur(path) or str(path))
 

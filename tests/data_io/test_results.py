@@ -115,8 +115,8 @@ def test_other_readers_read_it(tmp_path):
         (b"", "the file is empty"),
         (b"theta_i_deg,M00\n", "the content is something else"),
         (None, "expected a file, found none"),
-        (0.5, "expected a complete netCDF 4 file"),
-        (0.97, "expected a complete netCDF 4 file"),
+        (0.5, "expected a complete HDF5 file"),
+        (0.97, "expected a complete HDF5 file"),
     ],
 )
 def test_a_bad_file_is_refused(tmp_path, content, message):

@@ -9,7 +9,7 @@ import numpy as np
 
 from pbrdf.errors import DataFileError
 
-__all__ = ["FAULTS", "first_line", "opened"]
+__all__ = ["DAMAGED", "FAULTS", "first_line", "opened"]
 
 # What the libraries below raise of damaged files
 FAULTS = (
@@ -31,7 +31,7 @@ MOST_EXPANSION = 2000
 MOST_BYTES = 16 * 2**30
 # Name and version of a global heap
 _HEAP = b"GCOL\1\0\0\0"
-HOSTILE = "A result holds its own data; do not read it from a stranger."
+HOSTILE = "A file holds its own data; do not read it from a stranger."
 DAMAGED = "The file is damaged; copy it again or repeat the run."
 
 
@@ -54,7 +54,7 @@ def opened(path: str | Path, content: bytes) -> Iterator[h5py.File]:
     try:
         file = h5py.File(h5py.h5f.open_file_image(content))
     except FAULTS as error:
-        problem = f"expected a complete netCDF 4 file, got: {first_line(error)}"
+        problem = f"expected a complete HDF5 file, got: {first_line(error)}"
         raise DataFileError(path, problem, "The file is truncated or damaged.") from error
     with file:
         try:
@@ -62,7 +62,7 @@ def opened(path: str | Path, content: bytes) -> Iterator[h5py.File]:
         except DataFileError:
             raise
         except FAULTS as error:
-            problem = f"expected a complete netCDF 4 file, got: {first_line(error)}"
+            problem = f"expected a complete HDF5 file, got: {first_line(error)}"
             cure = "The file is truncated or damaged."
             raise DataFileError(path, problem, cure) from error
         yield file
