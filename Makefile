@@ -75,6 +75,7 @@ stability: .venv/.dev
 COUNT ?= 2000
 fuzz: .venv/.dev
 	PYTHONPATH=. $(BIN)/python tests/fuzz/run.py --count $(COUNT)
+	PYTHONPATH=. $(BIN)/python tests/fuzz/commands.py
 
 KILLS ?= 50
 TWINS ?= 20

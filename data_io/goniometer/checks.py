@@ -12,6 +12,8 @@ __all__ = ["check"]
 _RADIAN_LIMIT_DEG = 1.6
 # Plausible wavelengths; 532 would be nanometres [um]
 _WAVELENGTH_RANGE = (0.01, 100.0)
+# A mirror within a microradian [1/sr]
+_BRIGHTEST = 1e9
 # Two columns of one quantity may differ by rounding and noise
 _DOLP_TOLERANCE = 0.05
 # Part of the brightest reading below which noise may exceed the signal
@@ -106,6 +108,11 @@ def _check_values(scan: Scan) -> None:
         infinite = np.isinf(values)
         if infinite.any():
             raise scan.fault(infinite, name, "expected a finite number, got inf", _LEAVE)
+        far = np.abs(values) > _BRIGHTEST
+        if far.any() and scan.quantity != "relative":
+            problem = f"expected at most {_BRIGHTEST:g}, got {values[np.argmax(far)]:.6g}"
+            cure = "No surface is so bright; declare counts by --quantity relative."
+            raise scan.fault(far, name, problem, cure)
         if name in ("M00", "DOLP", *INTENSITIES) or name.endswith(STDERR):
             negative = values < -_noise(scan, name)
             if negative.any():

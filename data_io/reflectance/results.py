@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import h5netcdf
+import numpy as np
 import xarray as xr
 from xarray.backends import H5NetCDFStore
 
@@ -137,6 +138,10 @@ def _plain_again(path: str | Path, dataset: xr.Dataset) -> xr.Dataset:
         problem = f"an attribute is no JSON: {first_line(error)}"
         raise DataFileError(path, problem, "The file is damaged.") from error
     dataset.encoding = {}
+    for name in set(dataset.data_vars) & {"brdf", "brdf_total"}:
+        if np.isinf(dataset[name].to_numpy()).any():
+            problem, place = "it holds inf, which no run gives", f"variable {name}"
+            raise DataFileError(path, problem, "Repeat the run.", column=place)
     return dataset
 
 

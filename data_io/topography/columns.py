@@ -5,6 +5,7 @@ taken for a height that its header calls something else.
 """
 
 import re
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from data_io.text.units import (
     warn_missing_unit,
 )
 from pbrdf.errors import DataFileError
+from pbrdf.files.reading import MOST_CELLS
 
 Columns = str | Sequence[str | int]
 
@@ -42,7 +44,6 @@ _ROLES = {
 }  # fmt: skip
 _BRACKETS = re.compile(r"\[([^\]]*)\]|\(([^)]*)\)|<([^>]*)>|\{([^}]*)\}")
 _SPLIT = re.compile(r"(?:^|\s)in\s+(\S+)\s*$|/\s*(\S+)\s*$|[_\s]([^\s_]+)\s*$")
-_OUTSIDE = r"(?![^\[(]*[\])])"
 _NO_HEIGHTS = re.compile(
     r"\b(slopes?|gradients?|steigung|neigung|intensity|[uµμnm]rad|arcsec)\b", re.IGNORECASE
 )
@@ -159,6 +160,9 @@ def name_columns(header: list[Line], data: Rows) -> list[Column] | None:
     otherwise than the numbers under them.
     """
     width = table_width(data)
+    if width > MOST_CELLS:
+        # A map; so many columns have no names
+        return None
     delimiter = find_delimiter(data.first)
     for i in range(len(header) - 1, max(len(header) - 9, -1), -1):
         names = _names(header[i].text, width, delimiter)
@@ -185,9 +189,9 @@ def _names(text: str, width: int, delimiter: str | None) -> list[str] | None:
     ways = [delimiter, "\t", ";", ","] if delimiter else ["\t", ";", ","]
     for mark in dict.fromkeys([*ways, None]):
         if mark is not None:
-            cells = re.split(re.escape(mark) + _OUTSIDE, text)
+            cells = _split_outside(re.escape(mark), text)
         else:
-            cells = re.split(r"\s{2,}" + _OUTSIDE, text)
+            cells = _split_outside(r"\s{2,}", text)
             if len(cells) != width:
                 cells = _words_with_units(text)
         cells = [cell.strip() for cell in cells]
@@ -196,6 +200,19 @@ def _names(text: str, width: int, delimiter: str | None) -> list[str] | None:
         if len(cells) == width and (width > 1 or _is_name(cells[0])):
             return cells
     return None
+
+
+def _split_outside(mark: str, text: str) -> list[str]:
+    """Split at a mark unless the next bracket after it closes one, in linear time."""
+    brackets = [found.start() for found in re.finditer(r"[\[\]()]", text)]
+    cells, start = [], 0
+    for found in re.finditer(mark, text):
+        following = bisect_left(brackets, found.end())
+        if following < len(brackets) and text[brackets[following]] in ")]":
+            continue
+        cells.append(text[start : found.start()])
+        start = found.end()
+    return [*cells, text[start:]]
 
 
 def _is_name(text: str) -> bool:

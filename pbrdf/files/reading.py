@@ -4,13 +4,21 @@ import io
 import math
 import stat
 import tokenize
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from pbrdf.errors import DataFileError
 
-__all__ = ["MOST_BYTES", "companion", "file_size", "read_array", "read_bounded"]
+__all__ = [
+    "MOST_BYTES",
+    "check_columns",
+    "companion",
+    "file_size",
+    "read_array",
+    "read_bounded",
+]
 
 # A header is read as Python source, and can fail in every way that source can
 _FAULTS_OF_HEADERS = (
@@ -25,6 +33,8 @@ _FAULTS_OF_HEADERS = (
     LookupError,
     OSError,
 )
+# Columns of a table
+MOST_CELLS = 10_000
 # Larger than any text or map that the readers can hold in the memory of a workstation
 MOST_BYTES = 4 * 2**30
 
@@ -125,3 +135,18 @@ def read_array(path: Path, most: int = MOST_BYTES) -> np.ndarray:
     except _FAULTS_OF_HEADERS as error:
         text = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
         raise DataFileError(path, f"expected a .npy file, got: {text}", cure) from error
+
+
+def check_columns(path: str | Path, lines: Iterable[str]) -> None:
+    """Refuse a table with so many cells in a line that it would take minutes to read.
+
+    Raises
+    ------
+    DataFileError
+        If a line has more than 10 000.
+    """
+    for number, line in enumerate(lines, 1):
+        cells = 1 + max(map(line.count, ",;\t")) if len(line) > MOST_CELLS else 1
+        if cells > MOST_CELLS:
+            problem = f"expected at most {MOST_CELLS} columns, got {cells}"
+            raise DataFileError(path, problem, "Is it a table?", line=number)

@@ -18,6 +18,8 @@ _CODECS = {"bytes", "zstd", "vlen-utf8", "crc32c"}
 _MOST_FILES, _MOST_METADATA = 200_000, 16 * 2**20
 # A variable may be so much larger than the store
 _MOST_EXPANSION = 2000
+# Points of a sweep, whose states are read at once
+_MOST_POINTS = 10**8
 _HOSTILE = "A result holds its own data; do not read it from a stranger."
 _DAMAGED = "The file is damaged; copy it again or repeat the run."
 
@@ -61,6 +63,8 @@ def check_store(path: Path, *, sparse: bool = False) -> None:
         if codecs - _CODECS or about.get("storage_transformers"):
             problem = f"it is packed by {', '.join(sorted(codecs - _CODECS))[:80]}"
             raise DataFileError(path, problem, _HOSTILE, column=place)
+        if name == "state" and count > _MOST_POINTS:
+            raise DataFileError(path, f"it has {count:.3g} points", _DAMAGED, column=place)
         if not sparse and 8 * count > _MOST_EXPANSION * size:
             problem = (
                 f"it would take {8 * count / 2**20:.0f} MiB of a store of {size} bytes"

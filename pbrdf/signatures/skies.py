@@ -205,9 +205,10 @@ def read_sky(path: str | Path) -> SkyTable:
 
     import pandas as pd
 
-    from pbrdf.files import read_bounded
+    from pbrdf.files import check_columns, read_bounded
 
     content = read_bounded(path).decode("utf-8", errors="replace")
+    check_columns(path, content.splitlines())
     try:
         table = pd.read_csv(io.StringIO(content), comment="#", skipinitialspace=True)
     except ValueError as error:

@@ -15,7 +15,15 @@ from pbrdf.simulation.singles.single_bounce import LEAST_DPHI, LEAST_THETA
 from pbrdf.simulation.spectra import BUFFER, WORTHWHILE
 from pbrdf.surface import GaussianSurface
 from pbrdf.tracer import arguments
-from pbrdf.tracer.memory import NODE, PROGRAM, SHARE, Size, check_room, free_bytes
+from pbrdf.tracer.memory import (
+    NODE,
+    PROGRAM,
+    SHARE,
+    Size,
+    check_room,
+    check_surface,
+    free_bytes,
+)
 
 __all__ = ["CURE", "OF_SIZE", "asked_size", "at_once", "at_work", "check_run"]
 
@@ -74,15 +82,12 @@ def check_run(
     ValueError
         With what it would take, and what to change.
     """
+    check_surface(scene.surface)
     need = at_work(
         scene, size, n_rays=n_rays, realizations=realizations, planned=planned,
         workers=workers, looks=looks,
     )  # fmt: skip
-    check_room(
-        need,
-        size.words(),
-        f"{CURE}, fewer workers=, or {_PARTS}.",
-    )
+    check_room(need, size.words(), f"{CURE}, fewer workers=, or {_PARTS}.")
 
 
 def at_work(
@@ -169,6 +174,7 @@ def at_once(
             workers=workers, looks=looks, among=size.waves,
         ) + _sights(part)  # fmt: skip
 
+    check_surface(scene.surface)
     least = replace(size, angles=1, waves=1)
     check_room(need(1, 1), least.words(), f"{CURE}, or fewer workers=.")
     free = SHARE * free_bytes()

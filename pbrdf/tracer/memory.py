@@ -11,7 +11,17 @@ from pathlib import Path
 
 from pbrdf.conventions import BOUNCES
 
-__all__ = ["NODE", "PROGRAM", "SHARE", "Size", "check_room", "free_bytes", "stored", "told"]
+__all__ = [
+    "NODE",
+    "PROGRAM",
+    "SHARE",
+    "Size",
+    "check_room",
+    "check_surface",
+    "free_bytes",
+    "stored",
+    "told",
+]
 
 # Of the memory that is free, a run may take this part
 SHARE = 0.8
@@ -163,3 +173,18 @@ def check_room(need: float, what: str, cure: str) -> None:
             f"would take {told(need)}: {what}. {cure}"
         )
         raise ValueError(msg)
+
+
+def check_surface(surface: object) -> None:
+    """Refuse a surface of which not even one sample fits into the memory that is free.
+
+    Raises
+    ------
+    ValueError
+        If it takes more.
+    """
+    shape = getattr(surface, "shape", ())
+    if shape:
+        nodes = f"{' x '.join(map(str, shape))} nodes of the surface"
+        cure = "Take a surface of a smaller shape."
+        check_room(NODE * math.prod(shape) + PROGRAM, nodes, cure)

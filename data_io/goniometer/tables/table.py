@@ -10,6 +10,7 @@ import pandas as pd
 
 from data_io.text.text import Line, is_comment, is_number, without_comments
 from pbrdf.errors import DataFileError
+from pbrdf.files import check_columns
 
 __all__ = ["RawTable", "read_table"]
 
@@ -84,6 +85,7 @@ def read_table(path: Path, lines: Sequence[Line]) -> RawTable:
     DataFileError
         If there are no names or no rows, or a row has cells too few or too many.
     """
+    check_columns(path, (line.text for line in lines))
     # Spreadsheets leave rows of separators
     content = [line for line in without_comments(lines) if line.text.strip(",;\t ")]
     comments = [line.text.strip().lstrip("#% ") for line in lines if is_comment(line)]
