@@ -138,8 +138,8 @@ def _plain_again(path: str | Path, dataset: xr.Dataset) -> xr.Dataset:
         problem = f"an attribute is no JSON: {first_line(error)}"
         raise DataFileError(path, problem, "The file is damaged.") from error
     dataset.encoding = {}
-    for name in set(dataset.data_vars) & {"brdf", "brdf_total"}:
-        if np.isinf(dataset[name].to_numpy()).any():
+    for name in ("brdf_total", "brdf"):
+        if name in dataset and np.isinf(dataset[name].to_numpy()).any():
             problem, place = "it holds inf, which no run gives", f"variable {name}"
             raise DataFileError(path, problem, "Repeat the run.", column=place)
     return dataset
