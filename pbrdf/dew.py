@@ -11,13 +11,13 @@ import xarray as xr
 from pbrdf.contaminants import Drops
 from pbrdf.conventions import direction
 from pbrdf.errors import AccuracyWarning, check_seed, require, told_once
+from pbrdf.memory import check_room
 from pbrdf.optics.materials import Material
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.memory import CURE, asked_size, at_work
 from pbrdf.simulation.run import simulate
 from pbrdf.surface import Surface
 from pbrdf.tracer.arguments import isotropic
-from pbrdf.tracer.memory import check_room
 
 DRY = "dry"
 # Directions this near to the specular one are its lobe, up to the second angle its skirt;

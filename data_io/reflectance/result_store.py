@@ -27,7 +27,7 @@ from pbrdf.files import complete_folder
 from pbrdf.files.hdf5 import DAMAGED, FAULTS, first_line
 from pbrdf.files.stores import check_store, description
 from pbrdf.files.writing import ExistsError
-from pbrdf.tracer.memory import SHARE, free_bytes, told
+from pbrdf.memory import SHARE, free_bytes, told
 
 __all__ = ["fill_store", "is_result_store", "read_store", "write_store"]
 

@@ -22,8 +22,8 @@ import xarray as xr
 from fitting.models.index_grid import IndexGrid
 from pbrdf import HeightMap, Material, MicrofacetModel, Scene, simulate
 from pbrdf.errors import AccuracyWarning
+from pbrdf.memory import check_room
 from pbrdf.simulation.memory import CURE, asked_size, at_work
-from pbrdf.tracer.memory import check_room
 
 __all__ = ["Trace", "group_count", "interpolate_bins", "merged", "trace"]
 

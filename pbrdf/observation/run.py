@@ -28,7 +28,6 @@ from pbrdf.surface import (
 )
 from pbrdf.tracer import arguments
 from pbrdf.tracer.asked import Run
-from pbrdf.tracer.memory import check_surface
 from pbrdf.validity import attach, lost_light_warnings, lost_ray_warnings
 
 __all__ = ["ESTIMATORS", "as_scan", "observe"]
@@ -172,7 +171,6 @@ def observe(  # noqa: PLR0913  (the public signature)
     )  # fmt: skip
     source = _half_angle("source_half_angle", source_half_angle, angles[0])
     detector = _half_angle("detector_half_angle", detector_half_angle, angles[1])
-    check_surface(scene.surface)
     widest, slope = max(source, detector), _rms_slope(scene.surface)
     look = Look(
         theta_i=angles[0],

@@ -5,13 +5,13 @@ from functools import partial
 import numpy as np
 
 from pbrdf.conventions import BOUNCES
+from pbrdf.memory import NODE, PROGRAM, Size, check_room
 from pbrdf.observation.look import Look, Sight
 from pbrdf.observation.one_sample import look_at
 from pbrdf.observation.readings import Readings
 from pbrdf.surface import FixedSurface, GaussianSurface, MeasuredSurface, MeshSurface
 from pbrdf.tracer.asked import Run
 from pbrdf.tracer.field import Field
-from pbrdf.tracer.memory import NODE, PROGRAM, Size, check_room
 from pbrdf.tracer.mesh_field import MeshField
 from pbrdf.tracer.schedule import MOST_SAMPLES, gather
 

@@ -10,12 +10,7 @@ from pbrdf.kernels.bins.bin_fits import MAX_ORDER, MIN_ORDER
 from pbrdf.kernels.paths.shading import N_RECORD
 from pbrdf.kernels.paths.spectra import N_SUMS
 from pbrdf.kernels.sights.light import N_CELL
-from pbrdf.scene.scene import Scene
-from pbrdf.simulation.singles.single_bounce import LEAST_DPHI, LEAST_THETA
-from pbrdf.simulation.spectra import BUFFER, WORTHWHILE
-from pbrdf.surface import GaussianSurface
-from pbrdf.tracer import arguments
-from pbrdf.tracer.memory import (
+from pbrdf.memory import (
     NODE,
     PROGRAM,
     SHARE,
@@ -24,6 +19,11 @@ from pbrdf.tracer.memory import (
     check_surface,
     free_bytes,
 )
+from pbrdf.scene.scene import Scene
+from pbrdf.simulation.singles.single_bounce import LEAST_DPHI, LEAST_THETA
+from pbrdf.simulation.spectra import BUFFER, WORTHWHILE
+from pbrdf.surface import GaussianSurface
+from pbrdf.tracer import arguments
 
 __all__ = ["CURE", "OF_SIZE", "asked_size", "at_once", "at_work", "check_run"]
 

@@ -7,6 +7,7 @@ import numpy as np
 import scipy.fft
 
 from pbrdf.errors import require
+from pbrdf.memory import check_surface
 from pbrdf.surface.drawing import generator, grid_shape
 from pbrdf.surface.heightmap import HeightMap
 
@@ -159,6 +160,7 @@ class GaussianSurface:
 
         Its columns end where no wave along y passes any more, at a power of 1e-14.
         """
+        check_surface(self)
         along_x = scipy.fft.fft(self.correlation(0)).real
         along_y = scipy.fft.rfft(self.correlation(1)).real
         amplitude_x = np.sqrt(np.maximum(along_x, 0.0))

@@ -2,10 +2,10 @@
 
 from typing import Any
 
+from pbrdf.memory import check_room
 from pbrdf.simulation.memory import CURE, asked_size, at_work
 from pbrdf.sweeps.description import Sweep
 from pbrdf.sweeps.layout import Layout
-from pbrdf.tracer.memory import check_room
 
 __all__ = ["check_sweep"]
 

@@ -15,9 +15,9 @@ import pbrdf.simulation.memory
 import pbrdf.simulation.parts
 from data_io import is_result_store, read_result, write_result
 from data_io.reflectance.result_store import write_store
+from pbrdf import memory
 from pbrdf.cli import main
 from pbrdf.errors import DataFileError
-from pbrdf.tracer import memory
 
 SCENE = """
 [surface]

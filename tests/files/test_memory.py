@@ -10,10 +10,10 @@ import pytest
 
 import pbrdf
 from fitting.models.simulated import SimulatedModel
+from pbrdf import memory
 from pbrdf.dew import compare_dew
 from pbrdf.sweeps import run_sweep, sweep_of
 from pbrdf.sweeps.in_memory import computed
-from pbrdf.tracer import memory
 
 ROUGH = pbrdf.GaussianSurface(shape=(64, 64), spacing=1.0, corr_length=8.0, slope_rms=0.2)
 SCENE = pbrdf.Scene(ROUGH, pbrdf.Material(1.5))
@@ -103,7 +103,7 @@ def test_control_groups_bind(tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of addresses")
 def test_the_limit_of_a_process_binds():
     code = (
-        "import resource; from pbrdf.tracer import memory\n"
+        "import resource; from pbrdf import memory\n"
         "resource.setrlimit(resource.RLIMIT_AS, (8 * 10**9, 8 * 10**9))\n"
         "print(memory.free_bytes())"
     )
@@ -118,7 +118,7 @@ PEAK = """
 import json, sys, warnings
 import numpy as np
 import pbrdf
-from pbrdf.tracer import memory
+from pbrdf import memory
 
 warnings.simplefilter("ignore")
 need = []

@@ -103,8 +103,8 @@ def command(
 
 def _check_file(directions: Any, size: dict[str, Any]) -> None:
     """Refuse a result that could be computed, but not written to one file."""
+    from pbrdf.memory import check_room, stored
     from pbrdf.simulation.memory import CURE, asked_size
-    from pbrdf.tracer.memory import check_room, stored
 
     asked = asked_size(directions, **size)
     cure = f"{CURE}, or write it part by part, -o name.zarr."
