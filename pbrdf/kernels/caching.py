@@ -133,6 +133,12 @@ def keeping(compiled: Callable[[bool], Any]) -> Any:
     return kernel
 
 
+@cache
+def _lock(file: Path, _process: int) -> FileLock:
+    """Lock of a file for a process: one that a fork inherited is not its own."""
+    return FileLock(file)
+
+
 def _let_one_process_compile(kernel: Any) -> None:
     """Hold a lock of the kernel's own while it is looked up, compiled and kept.
 
@@ -141,11 +147,11 @@ def _let_one_process_compile(kernel: Any) -> None:
     """
     function = kernel.py_func
     place, _ = _place_and_stamp(function.__code__.co_filename)
-    lock = FileLock(_FOLDER / f"{place}.{function.__qualname__}.lock", is_singleton=True)
+    file = _FOLDER / f"{place}.{function.__qualname__}.lock"
     compile_ = kernel.compile
 
     def alone(signature: Any) -> Any:
-        with global_compiler_lock, lock.acquire(poll_interval=0.01):
+        with global_compiler_lock, _lock(file, os.getpid()).acquire(poll_interval=0.01):
             return compile_(signature)
 
     kernel.compile = alone

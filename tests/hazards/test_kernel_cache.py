@@ -164,3 +164,22 @@ def test_a_part_of_other_kernels_refuses_python_and_gets_an_entry():
     assert from_python(dot)(place, place) == pytest.approx(0.94)
     with pytest.raises(TypeError, match="from_python"):
         dot(place, place)
+
+
+FORKED = """
+import os
+from pbrdf.kernels.microfacet.slopes import GAUSSIAN, slope_norm
+child = os.fork()
+if not child:
+    os._exit(0 if slope_norm(GAUSSIAN, 0.3, 0.2) == 1.0 else 1)
+print(os.waitpid(child, 0)[1])
+"""
+
+
+def test_a_fork_compiles_what_its_parent_did_not(tmp_path):
+    """The locks of its parent are not its own."""
+    run = subprocess.run(
+        [sys.executable, "-c", FORKED], capture_output=True, text=True, check=False,
+        env=os.environ | {"PBRDF_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert run.stdout.strip() == "0", run.stderr
