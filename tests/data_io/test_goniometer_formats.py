@@ -433,3 +433,10 @@ def test_readings_of_one_level_have_standard_errors():
     noise = 0.01 * np.random.default_rng(3).standard_normal(33)
     found = standard_errors(0.2 + noise, None, curve, view, brightness=np.full(33, 0.2))
     assert 0.006 < np.median(found) < 0.02
+
+
+def test_optical_constants_are_told_from_scans(tmp_path):
+    path = tmp_path / "paint.csv"
+    path.write_text("wavelength_nm,N,K\n400,1.5,0\n500,1.49,0\n")
+    with pytest.raises(DataFileError, match=r"got columns 'N', 'K'.*--material-file"):
+        read_goniometer(path)

@@ -183,6 +183,10 @@ def _unknown(
     path: Path, table: RawTable, unknown: list[str], without_unit: list[str]
 ) -> DataFileError:
     """Return the error that names every column without a meaning or a unit."""
+    if "n" in map(str.lower, unknown) and not without_unit:
+        problem = f"expected a scan, got columns {', '.join(map(repr, unknown))}"
+        cure = "Optical constants are given by --material-file, material_file= or file =."
+        raise DataFileError(path, problem, cure, line=table.header)
     said = []
     if unknown:
         said.append(f"expected known columns, got {', '.join(map(repr, unknown))}")
