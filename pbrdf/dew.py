@@ -14,7 +14,7 @@ from pbrdf.errors import AccuracyWarning, check_seed, require, told_once
 from pbrdf.memory import check_room
 from pbrdf.optics.materials import Material
 from pbrdf.scene.scene import Scene
-from pbrdf.simulation.memory import CURE, asked_size, at_work
+from pbrdf.simulation.memory import CURE, Effort, asked_size, at_work
 from pbrdf.simulation.run import simulate
 from pbrdf.surface import Surface
 from pbrdf.tracer.arguments import isotropic
@@ -145,11 +145,7 @@ def _check_memory(
         theta_i, "uniform", given["wavelength"], given["n_theta"], given["n_dphi"],
         given["stokes"],
     )  # fmt: skip
-    work = at_work(
-        scene, size, n_rays=given.get("n_rays"), realizations=given.get("realizations"),
-        planned="target_rel_error" in given, workers=given.get("workers"),
-        looks=given.get("variance_reduction", True),
-    )  # fmt: skip
+    work = at_work(scene, size, Effort.of(given))
     kept = states * runs * size.unit
     # All runs of a state whole beside the BRDF of those before; then copies by state, for
     # the mean and for its error

@@ -23,7 +23,7 @@ from fitting.models.index_grid import IndexGrid
 from pbrdf import HeightMap, Material, MicrofacetModel, Scene, simulate
 from pbrdf.errors import AccuracyWarning
 from pbrdf.memory import check_room
-from pbrdf.simulation.memory import CURE, asked_size, at_work
+from pbrdf.simulation.memory import CURE, Effort, asked_size, at_work
 
 __all__ = ["Trace", "group_count", "interpolate_bins", "merged", "trace"]
 
@@ -131,10 +131,10 @@ def trace(  # noqa: PLR0913  (what one may want to choose of a run)
     each = -(-realizations // groups)
     lights = np.atleast_1d(theta_i).size
     size = asked_size([0.0] * lights, 0.0, keys, n_theta, n_dphi, stokes)
-    work = at_work(
-        scene, size, n_rays=n_rays, realizations=each, planned=False, workers=workers,
-        looks=False,
-    )  # fmt: skip
+    effort = Effort(
+        n_rays=n_rays, realizations=each, workers=workers, planned=False, looks=False
+    )
+    work = at_work(scene, size, effort)
     cure = f"{CURE}, or a smaller index_range=."
     check_room(work + groups * size.result, f"{groups} runs x {size.words()}", cure)
     runs = []

@@ -1,6 +1,8 @@
 """Memory that `simulate` will take, foretold before it begins."""
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +27,7 @@ from pbrdf.simulation.spectra import BUFFER, WORTHWHILE
 from pbrdf.surface import GaussianSurface
 from pbrdf.tracer import arguments
 
-__all__ = ["CURE", "OF_SIZE", "asked_size", "at_once", "at_work", "check_run"]
+__all__ = ["CURE", "OF_SIZE", "Effort", "asked_size", "at_once", "at_work", "check_run"]
 
 CURE = (
     "Reduce theta_i=, phi_i=, wavelength=, n_theta= or n_dphi=, take stokes='unpolarized'"
@@ -63,16 +65,39 @@ def asked_size(
     )
 
 
-def check_run(
-    scene: Scene,
-    size: Size,
-    *,
-    n_rays: int | None,
-    realizations: int | None,
-    planned: bool,
-    workers: int | None,
-    looks: bool,
-) -> None:
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much is traced, and by how many, as `simulate` is asked.
+
+    Attributes
+    ----------
+    n_rays, realizations, workers : int or None
+        As of `simulate`.
+    planned : bool
+        Whether there is a target error, and samples are as many as it takes.
+    looks : bool
+        Whether single bounces may come from looks at facets.
+    """
+
+    n_rays: int | None
+    realizations: int | None
+    workers: int | None
+    planned: bool
+    looks: bool
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> "Effort":
+        """Return what these options of `simulate` ask for."""
+        return cls(
+            n_rays=given.get("n_rays"),
+            realizations=given.get("realizations"),
+            workers=given.get("workers"),
+            planned=given.get("target_rel_error") is not None,
+            looks=given.get("variance_reduction", True),
+        )
+
+
+def check_run(scene: Scene, size: Size, effort: Effort) -> None:
     """Refuse a run that does not fit into the memory that is free.
 
     Arguments as of `at_work`.
@@ -83,24 +108,11 @@ def check_run(
         With what it would take, and what to change.
     """
     check_surface(scene.surface)
-    need = at_work(
-        scene, size, n_rays=n_rays, realizations=realizations, planned=planned,
-        workers=workers, looks=looks,
-    )  # fmt: skip
+    need = at_work(scene, size, effort)
     check_room(need, size.words(), f"{CURE}, fewer workers=, or {_PARTS}.")
 
 
-def at_work(
-    scene: Scene,
-    size: Size,
-    *,
-    n_rays: int | None,
-    realizations: int | None,
-    planned: bool,
-    workers: int | None,
-    looks: bool,
-    among: int | None = None,
-) -> float:
+def at_work(scene: Scene, size: Size, effort: Effort, *, among: int | None = None) -> float:
     """Return the most that `simulate` takes at one time. [bytes]
 
     It is an upper end: threads need not hold all tallies that they may at one time.
@@ -110,21 +122,18 @@ def at_work(
     scene : Scene
     size : Size
         What is computed.
-    n_rays, realizations, workers : int or None
-        As of `simulate`.
-    planned : bool
-        Whether there is a target error, and samples are as many as it takes.
-    looks : bool
-        Whether single bounces may come from looks at facets.
+    effort : Effort
+        How much is traced.
     among : int, optional
         How many wavelengths there are in all, if these are a part of them.
     """
-    threads = arguments.worker_count(workers)
-    rays = arguments.count("n_rays", n_rays or _RAYS, 1)
-    drawn = arguments.count("realizations", realizations or (_MANY if planned else 1), 1)
+    threads = arguments.worker_count(effort.workers)
+    rays = arguments.count("n_rays", effort.n_rays or _RAYS, 1)
+    few = _MANY if effort.planned else 1
+    drawn = arguments.count("realizations", effort.realizations or few, 1)
     batched = not arguments.varies(scene) or drawn == 1
     samples = max(arguments.BATCHES, drawn) if batched else drawn
-    samples = _MANY if planned else samples
+    samples = _MANY if effort.planned else samples
     clean = not scene.contaminants and not getattr(scene.surface, "transparent", ())
     spectral = clean and (among or size.waves) >= WORTHWHILE
     # Those traced, those that wait for the one before them, and the one that is added
@@ -136,7 +145,7 @@ def at_work(
     finished = size.result + 8 * size.unit / size.n_stokes**2
     surface = scene.surface
     drawn_anew = isinstance(surface, GaussianSurface) and not batched
-    if looks and drawn_anew and not spectral:
+    if effort.looks and drawn_anew and not spectral:
         sights = _sights(size)
         held += sights
         finished += sights + 6 * size.unit / size.n_stokes**2
@@ -148,15 +157,7 @@ def at_work(
     return max(held + surfaces, finished) + PROGRAM
 
 
-def at_once(
-    scene: Scene,
-    size: Size,
-    *,
-    n_rays: int | None,
-    realizations: int | None,
-    workers: int | None,
-    looks: bool,
-) -> tuple[int, int]:
+def at_once(scene: Scene, size: Size, effort: Effort) -> tuple[int, int]:
     """Return how many directions of the source, and wavelengths, fit into free memory.
 
     Fewer wavelengths than all only where not even one direction fits with all of them.
@@ -169,10 +170,7 @@ def at_once(
 
     def need(angles: int, waves: int) -> float:
         part = replace(size, angles=angles, waves=waves)
-        return at_work(
-            scene, part, n_rays=n_rays, realizations=realizations, planned=False,
-            workers=workers, looks=looks, among=size.waves,
-        ) + _sights(part)  # fmt: skip
+        return at_work(scene, part, effort, among=size.waves) + _sights(part)
 
     check_surface(scene.surface)
     least = replace(size, angles=1, waves=1)

@@ -12,7 +12,7 @@ import xarray as xr
 
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation import memory
-from pbrdf.simulation.memory import OF_SIZE, asked_size, check_run
+from pbrdf.simulation.memory import OF_SIZE, Effort, asked_size, check_run
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.results import judged_before, labelled
 from pbrdf.simulation.run import planned, prepared, simulate, traced, wants_looks
@@ -80,10 +80,7 @@ def simulate_parts(
         raise ValueError(msg)
     size = asked_size(theta_i, **{name: given[name] for name in OF_SIZE})
     if at_once is None:
-        at_once, fitting = memory.at_once(
-            scene, size, n_rays=given["n_rays"], realizations=given["realizations"],
-            workers=given["workers"], looks=given["variance_reduction"],
-        )  # fmt: skip
+        at_once, fitting = memory.at_once(scene, size, Effort.of(given))
         waves_at_once = waves_at_once or fitting
     at_once = arguments.count("at_once", at_once, 1)
     by_waves = arguments.count("waves_at_once", waves_at_once or size.waves, 1)
@@ -188,11 +185,8 @@ def _check_all(each: Sequence[Ready]) -> None:
     """Refuse runs that do not fit together into the memory that is free."""
     given = each[0].given
     size = asked_size(given["theta_i"], **{name: given[name] for name in OF_SIZE})
-    check_run(
-        each[0].run.scene, replace(size, waves=sum(len(one.run.n) for one in each)),
-        n_rays=given["n_rays"], realizations=given["realizations"], planned=False,
-        workers=given["workers"], looks=given["variance_reduction"],
-    )  # fmt: skip
+    waves = sum(len(one.run.n) for one in each)
+    check_run(each[0].run.scene, replace(size, waves=waves), Effort.of(given))
 
 
 def _joined(each: Sequence[Ready]) -> list[Plan]:

@@ -13,7 +13,7 @@ import pbrdf.accessor  # noqa: F401  (registers ds.pbrdf)
 from pbrdf.contaminants import Film
 from pbrdf.kernels.bodies.world import Media
 from pbrdf.scene.scene import Scene
-from pbrdf.simulation.memory import OF_SIZE, asked_size, check_run
+from pbrdf.simulation.memory import OF_SIZE, Effort, asked_size, check_run
 from pbrdf.simulation.pilot import choose
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.results import judged_before, labelled
@@ -199,10 +199,7 @@ def planned(*, whole: bool = True, **given: Any) -> Ready:
     root = arguments.seed_sequence(given["seed"])
     size = asked_size(theta_i, **{name: given[name] for name in OF_SIZE})
     if whole:
-        check_run(
-            scene, size, n_rays=n_rays, realizations=realizations,
-            planned=target is not None, workers=given["workers"], looks=light,
-        )  # fmt: skip
+        check_run(scene, size, Effort.of(given))
     geometry = {name: given[name] for name in _GEOMETRY}
     common = {name: given[name] for name in ("wavelength", "workers")}
     pilot = partial(

@@ -3,7 +3,7 @@
 from typing import Any
 
 from pbrdf.memory import check_room
-from pbrdf.simulation.memory import CURE, asked_size, at_work
+from pbrdf.simulation.memory import CURE, Effort, asked_size, at_work
 from pbrdf.sweeps.description import Sweep
 from pbrdf.sweeps.layout import Layout
 
@@ -38,11 +38,8 @@ def check_sweep(
         given["theta_i"], given.get("phi_i", 0.0), given.get("wavelength"),
         given.get("n_theta", 45), given.get("n_dphi", 90), given.get("stokes", "full"),
     )  # fmt: skip
-    point = at_work(
-        scene, size, n_rays=given.get("n_rays"), realizations=given.get("realizations"),
-        planned="target_rel_error" in given, workers=max(1, cores // max(at_once, 1)),
-        looks=True,
-    )  # fmt: skip
+    shared = {"workers": max(1, cores // max(at_once, 1)), "variance_reduction": True}
+    point = at_work(scene, size, Effort.of(given | shared))
     # What a group holds stands a second time where it is written
     group = 2.0 * layout.group_bytes
     if at_once:

@@ -247,10 +247,9 @@ def test_a_store_takes_what_no_memory_holds(folder, monkeypatch, capsys):
 def test_a_store_takes_wavelengths_that_no_memory_holds(folder, monkeypatch, capsys):
     """Not one direction fits with all of them."""
     size = memory.Size(angles=1, azimuths=1, waves=60, bins=30 * 30, n_stokes=4)
-    need = pbrdf.simulation.memory.at_work(
-        pbrdf.load_scene("scene.toml"), size, n_rays=1000, realizations=8, planned=False,
-        workers=1, looks=True,
-    )  # fmt: skip
+    of = pbrdf.simulation.memory
+    effort = of.Effort.of({"n_rays": 1000, "realizations": 8, "workers": 1})
+    need = of.at_work(pbrdf.load_scene("scene.toml"), size, effort)
     waves = np.linspace(0.4, 0.8, 60)
     run = ["simulate", "scene.toml", "--n-theta", "30", "--n-dphi", "30", "--realizations",
            "8", "--n-rays", "1000", "--theta-i-deg", "10,50", "--workers", "1",
