@@ -29,9 +29,8 @@ from data_io.topography.channels import ChannelWarning
 from data_io.topography.height_map import read_height_map
 from data_io.topography.mesh_map import OverhangWarning
 from data_io.topography.plausible import ScaleWarning
-from data_io.topography.profile import (
-    MendedProfile,
-    Profile,
+from data_io.topography.profile import MendedProfile, Profile
+from data_io.topography.profile_files import (
     holds_profile,
     mend_profile,
     read_profile,

@@ -9,17 +9,17 @@ from data_io.mending.faults import mend as mend_map
 from data_io.text.files import TEXT_SUFFIXES, NotAMapError, read_bytes
 from data_io.text.units import unit_factor, warn_missing_unit
 from data_io.topography.columns import Columns
-from data_io.topography.height_picture import PICTURES, read_height_picture
-from data_io.topography.height_text import Spacing, build_map, known_steps, read_text_map
-from data_io.topography.instruments import is_park_tiff, read_instrument_map
-from data_io.topography.measurement_standard import (
+from data_io.topography.formats.instruments import is_park_tiff, read_instrument_map
+from data_io.topography.formats.measurement_standard import (
     is_measurement_standard,
     read_measurement_standard,
 )
+from data_io.topography.formats.sdf import is_text_sdf, read_text_sdf
+from data_io.topography.formats.x3p import is_x3p, read_x3p_map
+from data_io.topography.height_picture import PICTURES, read_height_picture
+from data_io.topography.height_text import Spacing, build_map, known_steps, read_text_map
 from data_io.topography.mesh_map import MESHES, read_mesh_map
 from data_io.topography.plausible import check_heights, check_scale, with_spacing
-from data_io.topography.sdf import is_text_sdf, read_text_sdf
-from data_io.topography.x3p import is_x3p, read_x3p_map
 from pbrdf.errors import DataFileError
 from pbrdf.files import read_array
 from pbrdf.surface.heightmap import HeightMap

@@ -164,7 +164,7 @@ def _kind(path: Path, columns: str | None, block: int | None) -> Kind:
     """Tell the kind from the name, and that of a text file from its columns."""
     suffix = path.suffix.lower()
     if suffix in _IMAGES:
-        from data_io.topography.instruments import is_park_tiff
+        from data_io.topography.formats.instruments import is_park_tiff
 
         return Kind.map if is_park_tiff(path) else Kind.image
     if suffix not in _TEXT or suffix == ".xyz":

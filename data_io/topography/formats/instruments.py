@@ -18,8 +18,8 @@ from data_io.micrograph.levels import unheard
 from data_io.text.files import NotAMapError
 from data_io.text.units import LENGTH_UNITS, normalise_unit, unit_factor
 from data_io.topography.channels import choose_channel
+from data_io.topography.formats.sur import plain_sur
 from data_io.topography.plausible import ScaleWarning, check_scale, with_spacing
-from data_io.topography.sur import plain_sur
 from pbrdf.errors import DataFileError
 from pbrdf.files import read_bounded
 from pbrdf.files.hdf5 import opened

@@ -1,0 +1,1 @@
+"""Formats of instruments and standards, each in a module of its own."""
