@@ -187,4 +187,4 @@ def check_surface(surface: object) -> None:
     if shape:
         nodes = f"{' x '.join(map(str, shape))} nodes of the surface"
         cure = "Take a surface of a smaller shape."
-        check_room(NODE * math.prod(shape) + PROGRAM, nodes, cure)
+        check_room(NODE * math.prod(shape), nodes, cure)
