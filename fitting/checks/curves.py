@@ -9,7 +9,10 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Curve", "brightness", "curves_of", "noise_of", "stderr_of"]
+__all__ = ["Curve", "brightness", "curves_of", "noise_of", "stderr_of", "together"]
+
+# Spread of one angle [rad] and of one wavelength [um] as they are read back
+ENCODER, READ_BACK = np.deg2rad(0.05), 2.5e-4
 
 # sin(theta_s) |sin(dphi)| of a reading that counts as in plane
 _PLANE = 2e-3
@@ -94,8 +97,8 @@ def curves_of(scan: "xr.Dataset") -> Iterator[Curve]:
 
     theta_i, wavelength = column("theta_i", np.nan), column("wavelength", np.nan)
     keys = np.column_stack([
-        np.rint(theta_i * 1e6), np.rint(column("phi_i", 0.0) * 1e6),
-        np.rint(np.nan_to_num(wavelength, nan=-1.0) * 1e9),
+        together(theta_i, ENCODER), together(column("phi_i", 0.0), ENCODER),
+        together(np.nan_to_num(wavelength, nan=-1.0), READ_BACK),
     ])  # fmt: skip
     value, stderr = found
     theta_s, dphi = column("theta_s", np.nan), column("dphi", np.nan)
@@ -106,6 +109,27 @@ def curves_of(scan: "xr.Dataset") -> Iterator[Curve]:
                 float(theta_i[here][0]), float(wavelength[here][0]),
                 theta_s[here], dphi[here], value[here], stderr[here],
             )  # fmt: skip
+
+
+def together(values: np.ndarray, within: float) -> np.ndarray:
+    """Give one number to values within a spread, as a setting is read back.
+
+    Only to look at a scan, and only where the groups stay apart: else equal ones alone.
+
+    Examples
+    --------
+    >>> together(np.array([0.5001, 0.4999, 0.6]), 1e-3).tolist()
+    [0, 0, 1]
+    >>> together(np.array([0.5, 0.5009, 0.5018]), 1e-3).tolist()
+    [0, 1, 2]
+    """
+    order = np.argsort(values)
+    label = np.empty(values.size, dtype=int)
+    label[order] = np.cumsum(np.diff(values[order], prepend=values[order][:1]) > within)
+    spreads = (np.ptp(values[label == k]) for k in range(label.max(initial=-1) + 1))
+    if any(spread > within for spread in spreads):
+        return np.unique(np.rint(values / (1e-3 * within)), return_inverse=True)[1].ravel()
+    return label
 
 
 def noise_of(values: np.ndarray) -> float:

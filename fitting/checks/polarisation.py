@@ -15,6 +15,8 @@ __all__ = ["check_polarisation"]
 
 # Standard errors that are beyond noise
 _FAR = 5.0
+# Of all light behind polarisers, and of the same behind others
+_APART = 0.02
 # About the specular direction [deg], and Q/I there that noise and light from below a rough
 # interface do not reach
 _LOBE, _ALONG_P = 10.0, 0.1
@@ -28,6 +30,19 @@ def check_polarisation(scan: "xr.Dataset") -> list[Finding]:
     """
     found = brightness(scan)
     findings = []
+    apart = float(scan.attrs.get("polarisers_apart", 0.0))
+    if abs(apart) > _APART:
+        findings.append(
+            Finding(
+                name="polarisers", severity="warning",
+                what=f"I45 + I135 is {abs(apart):.1%} "
+                f"{'more' if apart > 0 else 'less'} than I0 + I90 in the middle "
+                "reading, and both are all light",
+                suspects="a drift, or another gain, between settings of the polariser",
+                cure="Measure again; or rename I0 to I_s and I90 to I_p, and ignore the "
+                "others by --columns.",
+            )
+        )  # fmt: skip
     for name in (f"M{i}{j}" for i in range(4) for j in range(4)):
         if found is None or name == "M00" or name not in scan:
             continue

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fitting.checks.curves import Curve, brightness, noise_of
+from fitting.checks.curves import READ_BACK, Curve, brightness, noise_of, together
 from fitting.checks.finding import Finding
 
 if TYPE_CHECKING:
@@ -148,8 +148,20 @@ def check_wavelengths(scan: "xr.Dataset") -> list[Finding]:
     """Say how many wavelengths there are, and that a relative scan has no scale."""
     findings = []
     if "wavelength" in scan.coords:
-        waves = np.unique(np.asarray(scan["wavelength"].values, float).round(9))
-        if waves.size > 1:
+        each = np.atleast_1d(np.asarray(scan["wavelength"].values, float))
+        waves = np.unique(each.round(9))
+        apart = np.unique(together(each, READ_BACK)).size
+        if apart < waves.size:
+            findings.append(
+                Finding(
+                    name="wavelengths", severity="warning",
+                    what=f"{waves.size} wavelengths, of which only {apart} lie further "
+                    f"apart than {1e3 * READ_BACK:g} nm",
+                    suspects="one setting, read back in each row",
+                    cure="Write the setting in each row; each wavelength is fitted apart.",
+                )
+            )  # fmt: skip
+        elif waves.size > 1:
             findings.append(
                 Finding(
                     name="wavelengths", severity="note",

@@ -29,7 +29,7 @@ def identifiability_warnings(
 ) -> list[str]:
     """Name parameters that the data do not determine, alone or in combination."""
     labels = problem.layout.labels
-    warnings = _at_bounds(problem, solved)
+    warnings = _at_bounds(problem, solved, found.stderr)
     # Of many wavelengths the first stands for all
     warnings += [_up_to_a_factor(problem, solved, one) for one in problem.gauges[:2]]
     if len(problem.gauges) > 2:
@@ -183,19 +183,33 @@ def misfit_warnings(problem: Problem, solved: Solved, p_value: float) -> list[st
     return warnings
 
 
-def _at_bounds(problem: Problem, solved: Solved) -> list[str]:
-    """Name parameters that ended on a bound."""
+def _at_bounds(problem: Problem, solved: Solved, stderr: np.ndarray) -> list[str]:
+    """Name parameters that ended on a bound, and gains beyond what a surface reflects."""
     warnings = []
-    for parameter, value in zip(problem.parameters, solved.solution.x, strict=True):
+    ends = zip(problem.parameters, solved.solution.x, stderr, strict=True)
+    for parameter, value, error in ends:
         if parameter.low == parameter.high:
             continue
         for bound in (parameter.low, parameter.high):
             if np.isfinite(bound) and abs(value - bound) <= 1e-9 * max(1.0, abs(bound)):
-                warnings.append(
+                text = (
                     f"{parameter.name} stands at its bound {bound:g}; the data would take "
                     "it further, or it is absent"
                 )
+                if _is_gain(parameter.name) and bound == 0.0:
+                    text += ", or forward lies at another azimuth: --azimuth-of-forward 0"
+                warnings.append(text)
+        if _is_gain(parameter.name) and value - 1.0 > max(0.2, 3.0 * error):
+            warnings.append(
+                f"{parameter.name} is {value:.3g}: no surface reflects more than it should "
+                "by its index. Is the scan relative, or a reflectance factor?"
+            )
     return warnings
+
+
+def _is_gain(name: str) -> bool:
+    """Whether a parameter is the specular gain, of all scans or of one."""
+    return name.partition("[")[0] == "specular_gain"
 
 
 def _cure(problem: Problem, solved: Solved, involved: Sequence[int]) -> str:

@@ -266,6 +266,9 @@ def misfit_of(
         judged.append(one)
     whole = _judged(columns, deviation, counts, np.arange(len(deviation)))
     verdict = max((one.verdict for one in judged), key=VERDICTS.index)
+    if share <= 0.0:
+        # As many parameters as readings can always be made to fit
+        verdict = "poor"
     groups = tuple(
         (str(columns["scan"][chosen[0]]), float(columns["wavelength"][chosen[0]]), one)
         for chosen, one in zip(members, judged, strict=True)

@@ -107,6 +107,7 @@ def test_wavelengths_under_the_wrong_unit_are_warned_of():
         ("p.csv", "0.4,1.5,0.1\n0.5,1.4,0.1\n", "line 1: expected the names of the columns"),
         ("p.csv", "wavelength_nm,n\n0.4,1.5\n0.5,1.4\n", "X-rays"),
         ("p.nk", "; made up\n0.4 1.5 0.1\n0.5 1.4 0.1\n", "expected one unit of the first column in a comment, got none"),
+        ("p.nk", "; film 200 nm, gap 1.42 eV\n0.4 1.5 0.1\n0.5 1.4 0.1\n", "column in a comment, got none"),
         ("p.yml", "- 1\n", "expected an entry of the refractiveindex.info database"),
         ("p.yml", "DATA:\n  - type: formula 77\n    wavelength_range: 1 2\n    coefficients: 1\n", "formula must be one of 1 to 9, got 77"),
         ("p.yml", "DATA:\n  - type: formula 1\n    wavelength_range: 1 2\n    coefficients: 0 1\n", "an odd number"),

@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from data_io import ConventionWarning, in_plane, read_goniometer
 from data_io.goniometer.scatter import standard_errors
+from fitting import check_scan
 from pbrdf.errors import DataFileError
 
 FRED = """type bsdf_data
@@ -440,3 +441,77 @@ def test_optical_constants_are_told_from_scans(tmp_path):
     path.write_text("wavelength_nm,N,K\n400,1.5,0\n500,1.49,0\n")
     with pytest.raises(DataFileError, match=r"got columns 'N', 'K'.*--material-file"):
         read_goniometer(path)
+
+
+ROWS = "45,-30,0.2003\n45,0,0.2259\n45,30,0.3692\n45,60,0.6174\n"
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "quantity: reflectance factor", "Quantity: Reflectance-Factor",
+        "quantity = BRF", "quantity reflectance_factor",
+        "quantity: reflectance-factor (pi times the BRDF)",
+    ],
+)  # fmt: skip
+def test_a_quantity_is_understood_in_every_spelling(tmp_path, said):
+    path = tmp_path / "scan.csv"
+    path.write_text(f"# {said}\ntheta_i_deg,theta_view_deg,M00\n{ROWS}")
+    np.testing.assert_allclose(read_goniometer(path).M00[1], 0.2259 / np.pi)
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ("quantity: radiance", "got 'radiance'"),
+        ("quantity: brdf\n# Quantity: relative", "got 'brdf', 'relative'"),
+    ],
+)
+def test_a_quantity_that_nobody_knows_is_refused(tmp_path, said, words):
+    path = tmp_path / "scan.csv"
+    path.write_text(f"# {said}\ntheta_i_deg,theta_view_deg,M00\n{ROWS}")
+    with pytest.raises(DataFileError, match=words):
+        read_goniometer(path)
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        ("M00,S0", "one source of M00, got M00, S0"),
+        ("M00,brdf_cos", "one source of M00, got M00, brdf_cos"),
+        ("BRF,M10", "one quantity, got BRF beside M10"),
+    ],
+)
+def test_one_quantity_has_one_column(tmp_path, names, words):
+    path = tmp_path / "scan.csv"
+    path.write_text(f"theta_i_deg,theta_view_deg,{names}\n45,0,0.1,0.02\n45,30,0.3,0.1\n")
+    with pytest.raises(DataFileError, match=words):
+        read_goniometer(path)
+    if "BRF" in names:
+        both = read_goniometer(path, quantity="reflectance-factor")
+        np.testing.assert_allclose(both.M10, np.array([0.02, 0.1]) / np.pi)
+
+
+def test_settings_of_a_polariser_are_compared(tmp_path):
+    """I0 + I90 and I45 + I135 are both all light."""
+    path = tmp_path / "scan.csv"
+    rows = "".join(f"45,{v},0.3,{0.25 * 1.1},0.2,{0.25 * 1.1}\n" for v in (-40, 0, 40))
+    path.write_text(f"theta_i_deg,theta_view_deg,I0,I45,I90,I135\n{rows}")
+    found = [f for f in check_scan(read_goniometer(path)) if f.name == "polarisers"]
+    assert len(found) == 1
+    assert "9.5% more than I0 + I90" in found[0].what
+
+
+def test_a_setting_read_back_is_one(tmp_path):
+    """Jitter of an encoder neither hides too much light nor makes many wavelengths."""
+    jitter = np.random.default_rng(2).normal(0, 0.004, 31)
+    wave = 650 + 0.02 * np.random.default_rng(3).normal(size=31)
+    rows = "".join(
+        f"{45 + a:.4f},{view},{w:.4f},4.0\n"
+        for a, view, w in zip(jitter, range(-75, 80, 5), wave, strict=True)
+    )
+    path = tmp_path / "scan.csv"
+    path.write_text(f"theta_i_deg,theta_view_deg,wavelength_nm,M00\n{rows}")
+    names = {f.name: f for f in check_scan(read_goniometer(path))}
+    assert names["energy"].severity == "error"
+    assert "of which only 1 lie further apart" in names["wavelengths"].what

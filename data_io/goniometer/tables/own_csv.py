@@ -7,18 +7,25 @@ from pathlib import Path
 import numpy as np
 
 from data_io.goniometer.declarations import QUANTITY_NAMES, Declared
-from data_io.goniometer.scan import STDERR, Scan
+from data_io.goniometer.scan import ELEMENTS, INTENSITIES, STDERR, Scan
 from data_io.goniometer.tables.angles import directions
-from data_io.goniometer.tables.columns import read_columns
+from data_io.goniometer.tables.columns import Columns, read_columns
 from data_io.goniometer.tables.counting import require_counted_from_zero
-from data_io.goniometer.tables.names import meaning_of
+from data_io.goniometer.tables.names import POLARISERS, STOKES, meaning_of
 from data_io.goniometer.tables.quantities import mueller_elements
 from data_io.goniometer.tables.table import read_table
 from data_io.goniometer.tables.writing import NOTES
 from data_io.text.text import Line, without_comments
 from pbrdf.errors import DataFileError
 
-_QUANTITY = re.compile(r"quantity\s*[:=]\s*(\S+)")
+_QUANTITY = re.compile(r"quantity\b\s*([:=]?)\s*(.+)", re.IGNORECASE)
+# What four polarisers give
+_BY_POLARISERS = ("M00", "M10", "M20")
+# What gives an element, beside the column of its own name
+_ALSO = {
+    "M00": ("S0", "reflectance-factor", "brdf-cos"),
+    **{f"M{k}0": (name,) for k, name in enumerate(STOKES) if k},
+}
 
 
 NAME = "csv"
@@ -51,12 +58,15 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
         problem = "expected this column, found none"
         cure = "Give any of M00..M33, m01..m33, DOLP, I_s, I_p, I0..I135, S0..S3."
         raise DataFileError(path, problem, cure, line=table.header, column="M00")
-    values, quantity = mueller_elements(columns.values)
     head = table.header
+    _require_one_source(path, columns, head)
+    values, quantity = mueller_elements(columns.values)
+    said = _quantity(path, table.comments)
+    if quantity is not None and said is None and declared.quantity is None:
+        _require_one_quantity(path, columns, quantity, head)
     require_counted_from_zero(path, columns, values, declared, table.comments, head)
     _require_four(path, values, table.header)
     _drop_unity(path, values, columns.lines)
-    said = _quantity(path, table.comments)
     # The notes that are written into every file need not pile up
     kept = [text for text in table.comments if text and not _noted(text)]
     return Scan(
@@ -80,8 +90,44 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
             "format": "csv",
             "title": kept[0] if kept else "",
             "comments": "\n".join(kept),
+            **_between_polarisers(columns),
         },
     )
+
+
+def _require_one_source(path: Path, columns: Columns, line: int) -> None:
+    """Refuse two columns that both give an element: one would replace the other."""
+    for element, others in _ALSO.items():
+        found = [name for name in (element, *others) if name in columns.values]
+        if element in _BY_POLARISERS and set(POLARISERS) <= columns.values.keys():
+            found.append("I0")
+        if len(found) > 1:
+            listed = ", ".join(columns.names.get(name, name) for name in found)
+            problem = f"expected one source of {element}, got {listed}"
+            cure = "Leave one out: --columns NAME=ignore."
+            raise DataFileError(path, problem, cure, line=line)
+
+
+def _require_one_quantity(path: Path, columns: Columns, quantity: str, line: int) -> None:
+    """Refuse elements in 1/sr beside a column whose name says another quantity."""
+    others = [name for name in columns.values if name in (*ELEMENTS, *INTENSITIES)]
+    if others:
+        name = columns.names.get(quantity, quantity)
+        problem = (
+            f"expected elements of one quantity, got {name} beside {', '.join(others)}"
+        )
+        cure = f"Where all are one, give --quantity {quantity}; ratios are m10, m20, ..."
+        raise DataFileError(path, problem, cure, line=line)
+
+
+def _between_polarisers(columns: Columns) -> dict[str, float]:
+    """Compare I0 + I90 with I45 + I135, both all light: the middle relative difference."""
+    if not set(POLARISERS) <= columns.values.keys():
+        return {}
+    light = columns.values
+    one, other = light["I0"] + light["I90"], light["I45"] + light["I135"]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return {"polarisers_apart": float(np.nanmedian(2 * (other - one) / (one + other)))}
 
 
 def _require_four(path: Path, values: Iterable[str], line: int) -> None:
@@ -111,14 +157,32 @@ def _noted(text: str) -> bool:
     return (
         text in NOTES
         or text.startswith(("Angles in rad, dphi", "M in 1/sr without"))
-        or _QUANTITY.fullmatch(text) is not None
+        or _said(text) is not None
     )
+
+
+def _said(text: str) -> str | None:
+    """Return the quantity that a comment names, in the spelling of the names.
+
+    >>> _said("Quantity: reflectance factor (pi times the BRDF)")
+    'reflectance-factor'
+    >>> _said("quantity of paint 3 g")
+    """
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        return None
+    bare = re.sub(r"\s*[\[(].*", "", match[2]).strip().rstrip(".")
+    name = re.sub(r"[\s_-]+", "-", bare).lower()
+    name = {"brf": "reflectance-factor"}.get(name, name)
+    return name if name in QUANTITY_NAMES or match[1] else None
 
 
 def _quantity(path: Path, comments: list[str]) -> str | None:
     """Return what a comment such as "quantity: relative" declares."""
-    found = [match[1] for text in comments if (match := _QUANTITY.fullmatch(text))]
-    if found and found[0] not in QUANTITY_NAMES:
-        problem = f"expected quantity: {' or '.join(QUANTITY_NAMES)}, got {found[0]!r}"
+    found = list(dict.fromkeys(said for text in comments if (said := _said(text))))
+    wrong = [said for said in found if said not in QUANTITY_NAMES]
+    if wrong or len(found) > 1:
+        got = ", ".join(map(repr, wrong or found))
+        problem = f"expected quantity: {' or '.join(QUANTITY_NAMES)}, got {got}"
         raise DataFileError(path, problem, "Mend the comment.")
     return found[0] if found else None

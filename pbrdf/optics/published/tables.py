@@ -209,9 +209,11 @@ def _ellipsometry(content: Sequence[Line]) -> tuple[list[Column], Sequence[Line]
 def _nk_columns(path: Path, comments: Sequence[Line]) -> list[Column]:
     """Return the columns of an .nk file: wavelength or energy, n, k.
 
-    Its comments name the unit; "A" is one in brackets only.
+    Its comments name the unit; "A" is one in brackets only, and one behind a number is that
+    of a thickness or of a gap.
     """
     text = " ".join(comment.text for comment in comments)
+    text = re.sub(r"\d[\d.]*(?:[eE][-+]?\d+)?\s*[^\W\d_]+", " ", text)
     words = re.findall(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]", text)
     words += [word for word in re.split(r"[\s,;:()\[\]]+", text) if len(word) > 1]
     found = {unit for word in words if (unit := unit_of(word))}
