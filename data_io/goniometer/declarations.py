@@ -164,7 +164,7 @@ def _turn(azimuth: float) -> float:
     for right in (0.0, 180.0):
         if abs(degrees - right) < 1e-9:
             return right
-    msg = f"azimuth_of_forward must be 0 or 180 degrees, got {degrees:g}."
+    msg = f"azimuth_of_forward must be 0 or pi rad (180 degrees), got {azimuth:g} rad."
     raise ValueError(msg)
 
 

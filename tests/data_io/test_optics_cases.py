@@ -260,7 +260,7 @@ def test_a_mapping_file_says_it_once_for_many(tmp_path):
         ({"columns": {"M00": "theta"}}, "expected a known meaning, got 'theta'"),
         (
             {"azimuth_of_forward": 1.0},
-            "azimuth_of_forward must be 0 or 180 degrees, got 57.2958",
+            r"azimuth_of_forward must be 0 or pi rad \(180 degrees\), got 1 rad",
         ),
         ({"angles": "gon"}, "angles must be one of deg, rad, got 'gon'"),
         ({"quantity": "bsdf"}, "quantity must be one of brdf, .*got 'bsdf'"),
