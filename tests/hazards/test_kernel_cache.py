@@ -52,7 +52,11 @@ def make_tree(root: Path, value: float) -> None:
 
 def asked(root: Path, cache: Path) -> tuple[float, int, str]:
     """Return answer, kernels compiled for it, and what was said."""
-    environment = os.environ | {"PBRDF_CACHE_DIR": str(cache), "PYTHONPATH": str(root)}
+    # Python tells an edited source by its size and the second in which it was written
+    environment = os.environ | {
+        "PBRDF_CACHE_DIR": str(cache), "PYTHONPATH": str(root),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }  # fmt: skip
     run = subprocess.run(
         [sys.executable, "-c", ASK],
         capture_output=True,
