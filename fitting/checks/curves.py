@@ -124,11 +124,15 @@ def together(values: np.ndarray, within: float) -> np.ndarray:
     [0, 1, 2]
     """
     order = np.argsort(values)
-    label = np.empty(values.size, dtype=int)
-    label[order] = np.cumsum(np.diff(values[order], prepend=values[order][:1]) > within)
-    spreads = (np.ptp(values[label == k]) for k in range(label.max(initial=-1) + 1))
-    if any(spread > within for spread in spreads):
+    ordered = values[order]
+    first = np.diff(ordered, prepend=ordered[:1]) > within
+    first[:1] = True
+    starts = np.flatnonzero(first)
+    ends = np.append(starts[1:], values.size)[: starts.size] - 1
+    if (ordered[ends] - ordered[starts] > within).any():
         return np.unique(np.rint(values / (1e-3 * within)), return_inverse=True)[1].ravel()
+    label = np.empty(values.size, dtype=int)
+    label[order] = np.cumsum(first) - 1
     return label
 
 
