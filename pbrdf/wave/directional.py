@@ -1,13 +1,13 @@
 """Statistics of heights that differ from direction to direction, as of a brushed surface.
 
-Waves of all directions are known to first order, and by tangent planes without shadows:
-there the heights enter through their spectrum at the lateral wave vector K alone.
+In the sum over orders they enter through their spectrum at the lateral wave vector K, in
+Smith's hiding through the slope along the azimuth of each way.
 """
 
 from typing import Any
 
 import numpy as np
-from scipy import interpolate
+from scipy import interpolate, special
 
 from pbrdf.errors import require
 from pbrdf.wave.statistics import Gaussian, Statistics
@@ -26,8 +26,15 @@ class Directional(Statistics):
     # The methods that need no more than the spectrum
     methods: tuple[str, ...] = ("first-order",)
 
+    # Lengths of the spectrum's features along its axes [um]
+    lengths: tuple[float, float]
+
     def lateral(self, k_x: Array, k_y: Array) -> Array:
         """Return what stands for K [rad/um] in sums over orders and in `spectrum`."""
+        raise NotImplementedError
+
+    def slopes(self, limit: float, azimuth: Array) -> Array:
+        """Rms slope along azimuths, of components up to `limit` [rad/um]. [1]"""
         raise NotImplementedError
 
 
@@ -38,7 +45,9 @@ class GaussianAxes(Gaussian, Directional):
     in every order.
     """
 
-    methods = ("first-order", "kirchhoff", "small-slope")
+    methods = (
+        "auto", "first-order", "kirchhoff", "small-slope", "order-weighted", "geometric"
+    )  # fmt: skip
 
     def __init__(self, height_rms: float, lengths: tuple[float, float]) -> None:
         sides = require(
@@ -52,6 +61,19 @@ class GaussianAxes(Gaussian, Directional):
         """See `Directional`."""
         scaled: Array = np.hypot(k_x * self.lengths[0], k_y * self.lengths[1])
         return scaled / self.corr_length
+
+    def slopes(self, limit: float, azimuth: Array) -> Array:
+        """See `Directional`.
+
+        In (K_x l_x, K_y l_y) the spectrum is round, and the limit an ellipse.
+        """
+        turn = np.linspace(0.0, 2 * np.pi, 512, endpoint=False)
+        x, y = np.cos(turn) / self.lengths[0], np.sin(turn) / self.lengths[1]
+        share = 4.0 * special.gammainc(2.0, 0.25 * limit**2 / (x**2 + y**2))
+        along_x, along_y = ((share * part**2).mean() for part in (x, y))
+        square = along_x * np.cos(azimuth) ** 2 + along_y * np.sin(azimuth) ** 2
+        found: Array = self.height_rms * np.sqrt(square)
+        return found
 
 
 class PlaneDensity(Directional):
@@ -69,6 +91,7 @@ class PlaneDensity(Directional):
         # The length of a Gaussian surface of this height and this density at 0
         length = np.sqrt(max(at_zero, 1e-300) / (np.pi * variance))
         super().__init__(float(np.sqrt(variance)), float(length))
+        self.lengths = 2 * (self.corr_length,)
 
     def lateral(self, k_x: Array, k_y: Array) -> Array:
         """See `Directional`: both parts in one complex number."""

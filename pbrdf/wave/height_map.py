@@ -12,6 +12,7 @@ from pbrdf.optics import library
 from pbrdf.optics.fresnel import specular_mueller
 from pbrdf.optics.materials import Material
 from pbrdf.surface import HeightMap
+from pbrdf.wave.specular import mueller_of
 
 __all__ = ["map_scattering"]
 
@@ -109,7 +110,7 @@ def map_scattering(
     # Efficiency (cos_s/cos_i) |2 cos_i b T/q|^2 with b = jones/(cos_s cos_i)
     rise = cosine + np.cos(angle)
     factor = 4.0 * power / (rise**2 * cosine * np.cos(angle))
-    matrices = _mueller(jones) * factor[:, None, None]
+    matrices = mueller_of(jones.reshape(-1, 2, 2)) * factor[:, None, None]
     # Each wave stands for (wavelength/side)^2 of projected solid angle
     matrices /= wave**2 / (heights.size * steps[0] * steps[1])
     kinship = 1.0 if height_map.periodic else HANN_KINSHIP
@@ -159,20 +160,6 @@ def _powers(
         spectrum = scipy.fft.fft2((field - mean) * fade, workers=1) / heights.size
         power[rows] = np.abs(spectrum[tuple(leaving[rows].T)]) ** 2
     return power, abs(phases(cos_i)[1]) ** 2
-
-
-def _mueller(jones: Array) -> Array:
-    """Mueller matrices of Jones matrices (ss, sp, ps, pp)."""
-    ss, sp, ps, pp = jones.T
-    fields = np.array([[ss, sp], [ps, pp]])
-    pauli = np.array([
-        [[1, 0], [0, 1]], [[1, 0], [0, -1]], [[0, 1], [1, 0]], [[0, 1j], [-1j, 0]],
-    ])  # fmt: skip
-    # I, Q, U, V of E_i E_j*: traces with these matrices, V = 2 Im(E_s E_p*)
-    return 0.5 * np.einsum(
-        "aij,jkn,bkl,iln->nab", pauli, fields, pauli.conj().swapaxes(1, 2), fields.conj(),
-        optimize=True,
-    ).real  # fmt: skip
 
 
 def _binned(

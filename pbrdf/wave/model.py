@@ -7,16 +7,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pbrdf.analytic.geometry import checked_zenith, flat_geometry
+from pbrdf.analytic.geometry import checked_azimuth, checked_zenith, flat_geometry
 from pbrdf.errors import require
 from pbrdf.optics import library
 from pbrdf.optics.materials import Material
 from pbrdf.wave.accuracy import relative_error
-from pbrdf.wave.directional import Directional, directional_heights
+from pbrdf.wave.directional import Directional, GaussianAxes, directional_heights
 from pbrdf.wave.energy import Energy, account, hemisphere
 from pbrdf.wave.local_curvature import profile_curvature
 from pbrdf.wave.methods import method_of
 from pbrdf.wave.scattering import Scattering
+from pbrdf.wave.specular import mueller_of
 from pbrdf.wave.statistics import Statistics
 from pbrdf.wave.surfaces import heights_of
 
@@ -35,7 +36,7 @@ class WaveModel:
         What is below the surface, or the name of a material of the library.
     height_rms, corr_length : float
         Rms height and 1/e length of the autocorrelation; (l_x, l_y) of a Gaussian one that
-        differs along the axes, for "first-order", "kirchhoff" and "small-slope". [um]
+        differs along the axes, for every method but "local-curvature". [um]
     autocorrelation : str, callable or (lag, correlation)
         "gaussian", "exponential", "k-correlation" (with `exponent`), a function of the lag
         [um] that is 1 at zero, or a table; corr_length then follows from it.
@@ -205,7 +206,13 @@ class WaveModel:
         found = self.surface.matrices(columns, phi_i=azimuth)
         return found.reshape(*shape, 4, 4)
 
-    def coherent(self, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike) -> Array:
+    def coherent(
+        self,
+        theta_i: npt.ArrayLike,
+        wavelength: npt.ArrayLike,
+        *,
+        phi_i: npt.ArrayLike = 0.0,
+    ) -> Array:
         """Mueller matrix of the mean field: the specular beam, as wide as the incident one.
 
         Parameters
@@ -214,21 +221,15 @@ class WaveModel:
             Incidence. [rad]
         wavelength : array_like
             Vacuum wavelength. [um]
+        phi_i : array_like
+            Azimuth of the source, where heights differ from direction to direction. [rad]
 
         Returns
         -------
         ndarray, shape (..., 4, 4)
             [..., 0, 0] is the reflectance of unpolarised light. [1]
         """
-        amplitudes = self._mean_amplitudes(self.surface, theta_i, wavelength)
-        r_s, r_p = amplitudes[..., 0], amplitudes[..., 1]
-        refl_s, refl_p, cross = abs(r_s) ** 2, abs(r_p) ** 2, r_s * r_p.conj()
-        out = np.zeros((*r_s.shape, 4, 4))
-        out[..., 0, 0] = out[..., 1, 1] = 0.5 * (refl_s + refl_p)
-        out[..., 0, 1] = out[..., 1, 0] = 0.5 * (refl_s - refl_p)
-        out[..., 2, 2] = out[..., 3, 3] = cross.real
-        out[..., 2, 3], out[..., 3, 2] = -cross.imag, cross.imag
-        return out
+        return mueller_of(self._mean_jones(self.surface, theta_i, wavelength, phi_i))
 
     def profile_scattering(
         self,
@@ -272,18 +273,29 @@ class WaveModel:
         theta_s: npt.ArrayLike,
         dphi: npt.ArrayLike,
         wavelength: npt.ArrayLike,
+        *,
+        phi_i: npt.ArrayLike = 0.0,
     ) -> Array:
         """Relative standard error of M00 of `brdf`, judged on rigorous solutions.
 
         Those are of profiles up to 0.8 wavelengths high, in plane. Arguments as in `brdf`.
+        Of heights with two lengths the larger error of the isotropic surfaces of either.
 
         Returns
         -------
         ndarray, shape (...)
             Error over value; 0.26 is 1 dB. [1]
         """
+        directions = theta_i, theta_s, dphi, wavelength
+        if isinstance(self.directional, GaussianAxes):
+            sides = [
+                self.with_parameters(corr_length=length).error_estimate(*directions)
+                for length in self.directional.lengths
+            ]
+            shape = np.broadcast_shapes(sides[0].shape, np.shape(phi_i))
+            return np.broadcast_to(np.maximum(*sides), shape)
         self._isotropic("an error")
-        shape, columns, _ = self._columns(theta_i, theta_s, dphi, wavelength)
+        shape, columns, _ = self._columns(*directions, phi_i)
         heights = self.surface.heights
         found, best, orders, plane = (
             Scattering(heights, name, 2).matrices(columns)[:, 0] for name in self._compared
@@ -321,7 +333,9 @@ class WaveModel:
         """The arguments that make this model."""
         return {one.name: getattr(self, one.name) for one in fields(self)}
 
-    def energy(self, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike) -> Energy:
+    def energy(
+        self, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike, *, phi_i: float = 0.0
+    ) -> Energy:
         """Account for unpolarised incident light, as shares of its power.
 
         Parameters
@@ -330,26 +344,31 @@ class WaveModel:
             Incidence. [rad]
         wavelength : array_like
             Vacuum wavelength. [um]
+        phi_i : float
+            Azimuth of the source, where heights differ from direction to direction. [rad]
         """
-        self._isotropic("the energy")
         theta, waves = checked_zenith("theta_i", theta_i), checked_wavelength(wavelength)
         theta, waves = np.broadcast_arrays(theta, waves)
-        coherent = self.coherent(theta, waves)[..., 0, 0]
+        coherent = self.coherent(theta, waves, phi_i=phi_i)[..., 0, 0]
         incoherent = np.empty(theta.shape)
         heights = self.surface.heights
         for at in np.ndindex(theta.shape):
             angle, wave = float(theta[at]), float(waves[at])
             slope = float(self.surface.slopes(np.array([wave]))[0])
             width = max(min(2.0 * slope, 0.4), 0.15 * wave / heights.corr_length)
-            light = partial(self._lightness, angle, wave)
+            light = partial(self._lightness, angle, wave, phi_i)
             incoherent[at] = hemisphere(angle, width, light)
         return account(coherent, incoherent, np.isinf(self.material.indices(waves)[0]))
 
     def _lightness(
-        self, theta_i: float, wavelength: float, theta_s: Array, dphi: Array
+        self, theta_i: float, wavelength: float, phi_i: float, theta_s: Array, dphi: Array
     ) -> Array:
-        """M00 of `brdf` in the order in which `hemisphere` asks."""
-        return self.brdf(theta_i, theta_s, dphi, wavelength)[..., 0, 0]
+        """M00 of `brdf`, the mean of both sides, as `hemisphere` asks for it."""
+        if self.directional is None:
+            return self.brdf(theta_i, theta_s, dphi, wavelength)[..., 0, 0]
+        sides = np.stack([dphi, -dphi])
+        found = self.brdf(theta_i, theta_s, sides[:, None], wavelength, phi_i=phi_i)
+        return found[..., 0, 0].mean(axis=0)
 
     def _in_plane(self, columns: list[Array]) -> Array:
         """Scattering of s and p by the profile and their interference, (N, 4).
@@ -378,15 +397,18 @@ class WaveModel:
         ndarray, shape (..., 2)
             For s (field along y) and p. [1]
         """
-        return np.abs(self._mean_amplitudes(self.profile, theta_i, wavelength)) ** 2
+        found = self._mean_jones(self.profile, theta_i, wavelength, 0.0)
+        return np.abs(np.diagonal(found, axis1=-2, axis2=-1)) ** 2
 
-    def _mean_amplitudes(
-        self, scattering: Scattering, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike
-    ) -> Array:
-        """Amplitudes (s, p) of the mean field, shape (..., 2)."""
+    def _mean_jones(
+        self, scattering: Scattering, theta_i: npt.ArrayLike, wavelength: npt.ArrayLike,
+        phi_i: npt.ArrayLike,
+    ) -> Array:  # fmt: skip
+        """Jones matrices of the mean field, shape (..., 2, 2)."""
         theta, waves = checked_zenith("theta_i", theta_i), checked_wavelength(wavelength)
         n, kappa = self.material.indices(waves)
-        return scattering.mean_amplitudes(theta, waves, n, kappa)
+        turn = checked_azimuth("phi_i", phi_i)
+        return scattering.mean_jones(theta, waves, n, kappa, turn)
 
     def _columns(
         self,

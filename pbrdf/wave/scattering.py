@@ -4,19 +4,23 @@ import os
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache, partial
 
 import numpy as np
 
 from pbrdf.errors import AccuracyWarning
-from pbrdf.kernels.wave import orders
 from pbrdf.kernels.wave.orders import fill_moments
-from pbrdf.kernels.wave.scatter import Plan, fill_scattering
-from pbrdf.wave.coherent import MeanField, Medium, mean_field
+from pbrdf.kernels.wave.scatter import (
+    CURVATURE,
+    ORDER_WEIGHTED,
+    Plan,
+    fill_scattering,
+)
 from pbrdf.wave.directional import Directional
 from pbrdf.wave.methods import method_of
 from pbrdf.wave.order_table import OrderTable
-from pbrdf.wave.statistics import Exponential, Gaussian, Statistics
+from pbrdf.wave.shadows import smith
+from pbrdf.wave.specular import Retardance, mean_jones
+from pbrdf.wave.statistics import Statistics
 
 __all__ = ["Scattering"]
 
@@ -28,12 +32,6 @@ CHUNK = 4096
 # Steeper surfaces send part of the light to a second bounce, which no form here has
 STEEPEST = 0.45
 SLOPED = ("auto", "order-weighted", "local-curvature")
-# Zeniths at which the phase of the mean field is found; it is smooth between them
-PHASE_ZENITHS = np.r_[np.linspace(0.0, 0.5 * np.pi, 19)[:-1], np.deg2rad(89.5)]
-# Heights that are told by height and length alone
-LAWS = {orders.GAUSSIAN: Gaussian, orders.EXPONENTIAL: Exponential}
-# The mean field of grazing incidence proper is that of a mirror
-LARGEST_SINE = 1.0 - 1e-12
 
 
 class Scattering:
@@ -53,7 +51,7 @@ class Scattering:
         self.heights, self.dimensions = heights, dimensions
         self.name, self.method = method, method_of(method)
         self._table: OrderTable | None = None
-        self._phases: dict[tuple[float, float, float], Array] = {}
+        self._phases = Retardance(heights, dimensions)
 
     def matrices(
         self, columns: list[Array], *, retarded: bool = True, phi_i: Array | float = 0.0
@@ -80,10 +78,12 @@ class Scattering:
         if not size:
             return out
         spreads = self._spreads(columns[3])
-        self._warn_of_slopes(spreads)
+        self._warn_of_slopes(columns[3])
         phases = self._retardance(columns) if retarded else np.zeros((2, size))
         moments = self._moments(2 * np.pi / columns[3].min())
-        plan = Plan(self.method.kernel, self.dimensions, self.method.shadowed)
+        hidden = self.method.shadowed
+        directional = isinstance(self.heights, Directional)
+        plan = Plan(self._kernel, self.dimensions, hidden and not directional)
         height = self.heights.height_rms
         lateral = self._lateral(columns, phi_i)
 
@@ -107,7 +107,26 @@ class Scattering:
         else:
             with ThreadPoolExecutor(available_cores()) as pool:
                 list(pool.map(fill_part, starts))
+        if hidden and isinstance(self.heights, Directional):
+            self._hide(out, self.heights, columns, np.broadcast_to(phi_i, size))
         return out
+
+    @property
+    def _kernel(self) -> int:
+        """Amplitude of an order, a code of `pbrdf.kernels.wave.scatter`."""
+        kernel = self.method.kernel
+        if kernel == CURVATURE and isinstance(self.heights, Directional):
+            return ORDER_WEIGHTED
+        return kernel
+
+    def _hide(
+        self, rows: Array, heights: Directional, columns: list[Array], phi_i: Array
+    ) -> None:
+        """Take from rows what surfaces of unequal directions hide."""
+        for at in each_wavelength(columns[3]):
+            limit = 4 * np.pi / float(columns[3][at[0]])
+            theta_i, theta_s, dphi = (c[at] for c in columns[:3])
+            rows[at] *= smith(heights, theta_i, theta_s, dphi, phi_i[at], limit)[:, None]
 
     def _lateral(self, columns: list[Array], phi_i: Array | float) -> Array | None:
         """Return what stands for K [rad/um], where heights know its direction."""
@@ -122,49 +141,12 @@ class Scattering:
             k * (out * np.sin(phi_s) + into * np.sin(phi_i)),
         )
 
-    def mean_amplitudes(
-        self, theta: Array, wavelength: Array, n: Array, kappa: Array
+    def mean_jones(
+        self, theta: Array, wavelength: Array, n: Array, kappa: Array, phi_i: Array
     ) -> Array:
-        """Reflection amplitudes (s, p) of the mean field, shape (..., 2)."""
-        columns = np.broadcast_arrays(theta, wavelength, n, kappa)
-        out = np.zeros((*columns[0].shape, 2), dtype=np.complex128)
-        if self.method.mean_field == "none":
-            return out
-        for at in np.ndindex(columns[0].shape):
-            angle, *given = (float(c[at]) for c in columns)
-            if self.method.mean_field == "kirchhoff" or isinstance(
-                self.heights, Directional
-            ):
-                out[at] = self._kirchhoff(angle, *given)
-            else:
-                out[at] = self._mean(angle, *given).amplitudes
-        return out
-
-    def _mean(self, theta: float, wavelength: float, n: float, kappa: float) -> MeanField:
-        """Mean field of one incidence and wavelength, to second order."""
-        k = 2 * np.pi / wavelength
-        unit = k ** (2 + self.dimensions)
-        return mean_field(
-            min(float(np.sin(theta)), LARGEST_SINE),
-            Medium.of(n, kappa),
-            k * self.heights.height_rms,
-            k * self.heights.corr_length,
-            lambda wave: self.heights.spectrum(wave * k, self.dimensions) * unit,
-            dimensions=self.dimensions,
-            bounded=self.heights.bounded,
-        )
-
-    def _kirchhoff(self, theta: float, wavelength: float, n: float, kappa: float) -> Array:
-        """Fresnel times exp(-2 (k h cos theta)^2)."""
-        cosine = float(np.cos(theta))
-        height = 2 * np.pi / wavelength * self.heights.height_rms
-        fall = np.exp(-2.0 * (height * cosine) ** 2)
-        if np.isinf(n):
-            return fall * np.array([-1.0, 1.0])
-        eps = complex(n, kappa) ** 2
-        inside = np.sqrt(eps - 1.0 + cosine**2)
-        r_s = (cosine - inside) / (cosine + inside)
-        return fall * np.array([r_s, (eps * cosine - inside) / (eps * cosine + inside)])
+        """Jones matrices of the mean field, shape (..., 2, 2)."""
+        columns = theta, wavelength, n, kappa, phi_i
+        return mean_jones(self.heights, self.dimensions, self.method.mean_field, columns)
 
     def slopes(self, wavelength: Array) -> Array:
         """Rms slope of the heights that a wave can resolve, of each wavelength. [1]"""
@@ -172,15 +154,26 @@ class Scattering:
 
     def _spreads(self, wavelength: Array) -> Array:
         """Rms wave vector per axis of the heights that a wave can resolve. [rad/um]"""
-        found, where = np.unique(wavelength, return_inverse=True)
-        limits = 4 * np.pi / found
-        spreads = np.array([self.heights.spread(v, self.dimensions) for v in limits])
-        return spreads[where.ravel()]
+        spreads = np.empty(wavelength.size)
+        for rows in each_wavelength(wavelength):
+            limit = 4 * np.pi / float(wavelength[rows[0]])
+            spreads[rows] = self.heights.spread(limit, self.dimensions)
+        return spreads
 
-    def _warn_of_slopes(self, spreads: Array) -> None:
+    def steepest(self, wavelength: Array) -> float:
+        """Rms slope along the steepest azimuth, by the shortest wave. [1]"""
+        shortest = wavelength.min()
+        if isinstance(self.heights, Directional):
+            axes = np.array([0.0, 0.5 * np.pi])
+            return float(self.heights.slopes(4 * np.pi / shortest, axes).max())
+        return float(self.slopes(np.array([shortest]))[0])
+
+    def _warn_of_slopes(self, wavelength: Array) -> None:
         """Say that second bounces are missing where the surface is steep."""
-        steepest = spreads.max() * self.heights.height_rms
-        if steepest > STEEPEST and self.name in SLOPED:
+        if self.name not in SLOPED:
+            return
+        steepest = self.steepest(wavelength)
+        if steepest > STEEPEST:
             warnings.warn(
                 f"The rms slope {steepest:.3g} exceeds {STEEPEST}: the light of second and "
                 "later bounces, 5 % of the power or more, is missing. simulate has it.",
@@ -219,51 +212,21 @@ class Scattering:
     def _retardance(self, columns: list[Array]) -> Array:
         """Phase of s over p that the mean field takes on its ways in and out, (2, N)."""
         phases = np.zeros((2, columns[0].size))
-        if self.name != "auto":
+        if self.name != "auto" or isinstance(self.heights, Directional):
             return phases
-        kinds, where = np.unique(np.stack(columns[3:], axis=1), axis=0, return_inverse=True)
-        for j, kind in enumerate(kinds):
-            key = (float(kind[0]), float(kind[1]), float(kind[2]))
-            if key not in self._phases:
-                self._phases[key] = self._retardances(*key)
-            rows = where.ravel() == j
+        for rows in each_wavelength(columns[3]):
+            wave, n, kappa = (float(c[rows[0]]) for c in columns[3:])
             for side in (0, 1):
-                zeniths = columns[side][rows]
-                phases[side, rows] = np.interp(zeniths, PHASE_ZENITHS, self._phases[key])
+                phases[side, rows] = self._phases.at(columns[side][rows], wave, n, kappa)
         return phases
 
-    def _retardances(self, wavelength: float, n: float, kappa: float) -> Array:
-        """Phases at `PHASE_ZENITHS`, which go with the square of the height."""
-        k, heights = 2 * np.pi / wavelength, self.heights
-        if heights.law in LAWS:
-            length = k * heights.corr_length
-            unit = unit_retardances(heights.law, length, self.dimensions, n, kappa)
-            return (k * heights.height_rms) ** 2 * unit
-        means = [
-            self._mean(float(zenith), wavelength, n, kappa) for zenith in PHASE_ZENITHS
-        ]
-        return np.array([mean.retardance for mean in means])
 
-
-@lru_cache(maxsize=4096)
-def unit_retardances(
-    law: int,
-    length: float,
-    dimensions: int,
-    n: float,
-    kappa: float,
-) -> Array:
-    """Phases at `PHASE_ZENITHS` over (k h)², of heights of length k l."""
-    heights = LAWS[law](1.0, length)
-    means = (
-        mean_field(
-            min(float(np.sin(zenith)), LARGEST_SINE), Medium.of(n, kappa), 1.0, length,
-            partial(heights.spectrum, dimensions=dimensions), dimensions=dimensions,
-            bounded=heights.bounded,
-        )
-        for zenith in PHASE_ZENITHS
-    )  # fmt: skip
-    return np.array([mean.retardance for mean in means])
+def each_wavelength(wavelength: Array) -> list[Array]:
+    """Rows of each wavelength; mostly it is one, which is seen without sorting."""
+    if (wavelength == wavelength[0]).all():
+        return [np.arange(wavelength.size)]
+    order = np.argsort(wavelength, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(wavelength[order])) + 1)
 
 
 def normal_and_lateral(columns: list[Array]) -> tuple[Array, Array]:

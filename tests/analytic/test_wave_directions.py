@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 from pbrdf import GaussianSurface, Material, WaveModel
 from pbrdf.derived.bins import bin_averages
+from pbrdf.optics import coherency_eigenvalues
 from pbrdf.wave import map_scattering
 from tests.wave_by_the_book import first_order, mueller
 
@@ -25,6 +26,11 @@ def rice(theta_i, theta_s, dphi, phi_i):
     return factor * density * mueller(first_order(theta_i, theta_s, dphi, INDEX))
 
 
+def smooth_beam(theta_i):
+    flat = WaveModel(MATERIAL, height_rms=1e-9, corr_length=1.0)
+    return flat.coherent(theta_i, WAVE)
+
+
 ANGLES = [(0.3, 0.5, 2.1, 0.4), (0.9, 0.2, -2.7, 2.9), (0.6, 0.6, np.pi, -1.1)]
 
 
@@ -42,36 +48,104 @@ def test_first_order_of_two_lengths_and_of_its_density(angles):
     assert table.surface.heights.height_rms == pytest.approx(HEIGHT, rel=1e-5)
     found = table.brdf(theta_i, theta_s, dphi, WAVE, phi_i=phi_i)
     assert_allclose(found, wanted, atol=1e-3 * wanted[0, 0])
-    beam = pair.coherent(0.3, WAVE)
-    alike = WaveModel(MATERIAL, height_rms=HEIGHT, corr_length=0.5, method="kirchhoff")
-    assert_allclose(beam, alike.coherent(0.3, WAVE), rtol=1e-12)
+    beams = [m.coherent(theta_i, WAVE, phi_i=phi_i) for m in (pair, table)]
+    lost = np.abs(beams[0] - smooth_beam(theta_i)).max()
+    assert_allclose(beams[1], beams[0], atol=0.02 * lost)
 
 
-@pytest.mark.parametrize("method", ["first-order", "kirchhoff", "small-slope"])
+EVERY = ["auto", "first-order", "kirchhoff", "small-slope", "order-weighted", "geometric"]
+
+
+@pytest.mark.parametrize("method", EVERY)
 def test_equal_lengths_are_the_isotropic_surface(method):
     given = {"height_rms": 0.2, "method": method}
-    one = WaveModel(MATERIAL, corr_length=2.0, **given)
+    # auto knows no curvatures of unequal directions
+    same = "order-weighted" if method == "auto" else method
+    one = WaveModel(MATERIAL, corr_length=2.0, **given).with_method(same)
     two = WaveModel(MATERIAL, corr_length=(2.0, 2.0), **given)
     at = (0.5, np.array([0.2, 0.9]), np.array([2.0, -2.8]), WAVE)
-    assert_allclose(two.brdf(*at, phi_i=0.7), one.brdf(*at), rtol=1e-10)
+    assert_allclose(two.brdf(*at, phi_i=0.7), one.brdf(*at), rtol=1e-10, atol=1e-14)
+    beam = one.coherent(0.5, WAVE)
+    assert_allclose(two.coherent(0.5, WAVE, phi_i=0.7), beam, rtol=1e-10, atol=1e-16)
     # A quarter turn exchanges the lengths
     long, wide = (
         WaveModel(MATERIAL, corr_length=pair, **given) for pair in ((3.0, 1.5), (1.5, 3.0))
     )
     turned = wide.brdf(*at, phi_i=0.7 + np.pi / 2)
-    assert_allclose(long.brdf(*at, phi_i=0.7), turned, rtol=1e-9)
+    assert_allclose(long.brdf(*at, phi_i=0.7), turned, rtol=1e-9, atol=1e-14)
+    beams = long.coherent(0.5, WAVE, phi_i=0.7), wide.coherent(0.5, WAVE, phi_i=0.7)
+    assert_allclose(
+        beams[0], wide.coherent(0.5, WAVE, phi_i=0.7 + np.pi / 2), rtol=1e-9, atol=1e-15
+    )
+    if method in ("auto", "first-order", "order-weighted"):
+        assert np.abs(beams[0] - beams[1]).max() > 1e-4 * beams[0][0, 0]
     assert abs(turned[0, 0, 0] / one.brdf(*at)[0, 0, 0] - 1) > 0.05
 
 
-def test_reciprocity_out_of_plane():
-    model = WaveModel(
-        MATERIAL, height_rms=0.1, corr_length=(1.4, 0.6), method="small-slope"
-    )
-    theta_i, theta_s, dphi, phi_i = 0.4, 0.9, 2.2, 0.5
+@pytest.mark.parametrize("method", EVERY)
+def test_reciprocity_and_realisability_out_of_plane(method):
+    model = WaveModel(MATERIAL, height_rms=0.1, corr_length=(1.4, 0.6), method=method)
+    rng = np.random.default_rng(8)
+    theta_i, theta_s = rng.uniform(0, 1.5, (2, 60))
+    dphi, phi_i = rng.uniform(0, 2 * np.pi, (2, 60))
     forth = model.brdf(theta_i, theta_s, dphi, WAVE, phi_i=phi_i)
     back = model.brdf(theta_s, theta_i, -dphi, WAVE, phi_i=phi_i + dphi)
     exchanged = np.diag([1.0, 1.0, -1.0, 1.0])
-    assert_allclose(exchanged @ back.T @ exchanged, forth, atol=1e-12 * forth[0, 0])
+    scale = np.maximum(forth[:, :1, :1], 1e-290)
+    turned = exchanged @ back.swapaxes(1, 2) @ exchanged
+    assert (np.abs(turned - forth) / scale).max() < 2e-12
+    assert coherency_eigenvalues(forth / scale).min() > -1e-13
+    # The beam comes back the way it came
+    theta_i, phi_i = theta_i[:3], phi_i[:3]
+    beam = model.coherent(theta_i, WAVE, phi_i=phi_i)
+    again = model.coherent(theta_i, WAVE, phi_i=phi_i + np.pi)
+    assert_allclose(exchanged @ again.swapaxes(1, 2) @ exchanged, beam, atol=1e-12)
+    assert coherency_eigenvalues(beam).min() > -1e-13
+
+
+@pytest.mark.parametrize("phi_i", [0.0, 0.8])
+@pytest.mark.parametrize("theta_i", [0.0, 0.5])
+def test_a_brushed_mirror_returns_all_light(phi_i, theta_i):
+    model = WaveModel(Material.mirror(), height_rms=0.02, corr_length=(0.8, 0.25))
+    energy = model.energy(theta_i, 1.0, phi_i=phi_i)
+    assert abs(energy.multiple) < 0.001
+    # The Kirchhoff factor would make light
+    plain = model.with_method("kirchhoff").coherent(theta_i, 1.0)[0, 0]
+    assert abs(plain - energy.coherent) > 0.005
+    # Out of its mirror planes it turns the polarisation of the beam
+    turned = np.abs(model.coherent(0.5, 1.0, phi_i=phi_i)[0:2, 2:]).max()
+    assert (turned > 1e-5) == (phi_i > 0.0)
+
+
+def test_the_beam_loses_what_first_order_scatters_of_every_polarisation():
+    """Mirrors keep the intensity of Q and U, too: this holds the sign of what is turned."""
+    theta_i, phi_i = 0.5, 0.8
+    model = WaveModel(
+        Material.mirror(), height_rms=3e-4, corr_length=(0.8, 0.25), method="first-order"
+    )
+    x, w = np.polynomial.legendre.leggauss(40)
+    theta_s, dphi = (x + 1) * np.pi / 4, np.arange(120) * np.pi / 60
+    area = w * np.pi / 4 * np.cos(theta_s) * np.sin(theta_s) * np.pi / 60
+    matrices = model.brdf(theta_i, theta_s[:, None], dphi, 1.0, phi_i=phi_i)
+    scattered = np.einsum("tda,t->a", matrices[..., 0, :], area)
+    lost = np.array([1.0, 0, 0, 0]) - model.coherent(theta_i, 1.0, phi_i=phi_i)[0]
+    assert_allclose(scattered, lost, atol=3e-5 * lost[0])
+    assert abs(lost[2]) > 0.1 * lost[0]
+
+
+def test_a_long_brush_is_a_profile():
+    """The mean field across the grooves, and Smith's hiding by slopes across them."""
+    for material in (MATERIAL, Material.mirror()):
+        brush = WaveModel(material, height_rms=0.06, corr_length=(0.7, 400.0))
+        profile = WaveModel(material, height_rms=0.06, corr_length=0.7)
+        beam = brush.coherent(0.5, WAVE)
+        lines = np.array([beam[0, 0] + beam[0, 1], beam[0, 0] - beam[0, 1]])
+        assert_allclose(lines, profile.profile_coherent(0.5, WAVE), rtol=3e-3)
+    slopes = brush.surface.heights.slopes(1e4, np.array([0.0, np.pi / 2, 0.6]))
+    steep = np.sqrt(2) * 0.06 / 0.7
+    assert_allclose(
+        slopes, steep * np.abs(np.cos([0.0, np.pi / 2, 0.6])), atol=2e-3 * steep
+    )
 
 
 def test_maps_of_two_lengths_scatter_so_by_their_transform():
@@ -108,7 +182,8 @@ def test_maps_of_two_lengths_scatter_so_by_their_transform():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"corr_length": (1.0, 2.0)}, "method must be one of first-order, kirchhoff"),
+        ({"corr_length": (1.0, 2.0), "method": "local-curvature"},
+         "method must be one of auto, first-order, kirchhoff"),
         ({"corr_length": (1.0, 2.0, 3.0), "method": "kirchhoff"}, "one length or two"),
         ({"corr_length": (1.0, -2.0), "method": "kirchhoff"}, "be positive"),
         ({"corr_length": (1.0, 2.0), "autocorrelation": "exponential"},
@@ -132,5 +207,7 @@ def test_densities_that_no_surface_has():
         with pytest.raises(ValueError, match=message):
             WaveModel(MATERIAL, psd=wrong, method="first-order")
     model = WaveModel(MATERIAL, psd=(f, f, density), method="first-order")
-    with pytest.raises(ValueError, match="energy must be asked of an isotropic surface"):
-        model.energy(0.3, 0.6)
+    with pytest.raises(ValueError, match="error must be asked of an isotropic surface"):
+        model.error_estimate(0.3, 0.6, 1.0, 0.6)
+    with pytest.raises(ValueError, match="method must be one of first-order where"):
+        WaveModel(MATERIAL, psd=(f, f, density))
