@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from data_io.goniometer.agreement import check_agreement, check_fractions, errors_of
 from data_io.goniometer.scan import ELEMENTS, INTENSITIES, NORMALISED, STDERR, Scan
-from data_io.goniometer.scatter import curve_keys, standard_errors
 from pbrdf.errors import DataFileError
 
 __all__ = ["check"]
@@ -14,8 +14,6 @@ _RADIAN_LIMIT_DEG = 1.6
 _WAVELENGTH_RANGE = (0.01, 100.0)
 # A mirror within a microradian [1/sr]
 _BRIGHTEST = 1e9
-# Two columns of one quantity may differ by rounding and noise
-_DOLP_TOLERANCE = 0.05
 # Part of the brightest reading below which noise may exceed the signal
 _DARK = 1e-3
 # Standard errors that are beyond noise
@@ -27,8 +25,9 @@ def check(scan: Scan) -> None:
     _check_angles(scan)
     _check_wavelength(scan)
     _check_values(scan)
-    _check_dolp(scan)
+    check_fractions(scan)
     _check_ratios(scan)
+    check_agreement(scan)
 
 
 def _check_angles(scan: Scan) -> None:
@@ -153,18 +152,8 @@ def _noise(scan: Scan, name: str) -> np.ndarray:
         return np.zeros(values.size)
     stated = scan.values.get(name + STDERR, np.full(values.size, np.nan))
     darkest = _DARK * np.nanmax(values, initial=0.0)
-    scatter = _FAR * np.nan_to_num(_errors(scan, name))
+    scatter = _FAR * np.nan_to_num(errors_of(scan, name))
     return np.where(np.isfinite(stated), _FAR * stated, np.maximum(darkest, scatter))
-
-
-def _errors(scan: Scan, name: str) -> np.ndarray:
-    """Return the standard errors of a column: as stated, by its scatter, or NaN."""
-    curve, view = curve_keys(
-        scan.theta_i, scan.theta_s, scan.dphi, scan.phi_i, scan.wavelength
-    )
-    stated = scan.values.get(name + STDERR)
-    brightness = scan.values.get("M00")
-    return standard_errors(scan.values[name], stated, curve, view, brightness=brightness)
 
 
 def _check_normalisation(scan: Scan) -> None:
@@ -175,7 +164,7 @@ def _check_normalisation(scan: Scan) -> None:
     for name in ELEMENTS[1:]:
         if name not in scan.values:
             continue
-        error = np.hypot(*(np.nan_to_num(_errors(scan, n)) for n in (name, "M00")))
+        error = np.hypot(*(np.nan_to_num(errors_of(scan, n)) for n in (name, "M00")))
         larger = np.abs(scan.values[name]) > intensity + _FAR * error
         compared = np.isfinite(scan.values[name]) & np.isfinite(intensity)
         if compared.any() and larger.sum() > 0.5 * compared.sum():
@@ -226,29 +215,3 @@ def _beyond(scan: Scan, name: str, intensity: np.ndarray, error: np.ndarray) -> 
     beyond = size > 1.02 * intensity + _FAR * error
     twice = size > 2.0 * np.abs(intensity) + floor
     return np.asarray(np.where(stated, beyond, beyond & twice))
-
-
-def _check_dolp(scan: Scan) -> None:
-    """DOLP is a fraction, and sqrt(M10^2 + M20^2) / M00 where these are given too."""
-    dolp = scan.values.get("DOLP")
-    if dolp is None:
-        return
-    noise = 5 * np.nan_to_num(scan.values.get("DOLP" + STDERR, np.zeros(dolp.size)))
-    wrong = dolp > 1 + noise
-    if wrong.any():
-        problem = f"expected a fraction in [0, 1], got {dolp[np.argmax(wrong)]:.9g}"
-        raise scan.fault(wrong, "DOLP", problem, "Divide per cent by 100.")
-    if not {"M00", "M10", "M20"} <= scan.values.keys():
-        return
-    m00, m10, m20 = (scan.values[name] for name in ("M00", "M10", "M20"))
-    lit = m00 > 0
-    ratio = np.hypot(m10, m20)[lit] / m00[lit]
-    for name in ("M10", "M20"):
-        error = scan.values.get(name + STDERR, np.zeros(dolp.size))
-        noise[lit] += 5 * np.nan_to_num(error[lit]) / m00[lit]
-    wrong[lit] = np.abs(ratio - dolp[lit]) > _DOLP_TOLERANCE + noise[lit]
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        expected = np.hypot(m10[row], m20[row]) / m00[row]
-        problem = f"expected sqrt(M10^2 + M20^2)/M00 = {expected:.4g}, got {dolp[row]:.4g}"
-        raise scan.fault(wrong, "DOLP", problem, "Mend or drop one of the columns.")

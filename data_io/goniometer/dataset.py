@@ -90,5 +90,10 @@ def _distinct(scan: Scan) -> np.ndarray:
                 f"line {scan.lines[original[row]]} has {reference[row]:.6g}"
             )
             cure = "Average repeats into one row with its standard error."
+            if "left_out" in scan.attrs:
+                cure = (
+                    f"If the text of {scan.attrs['left_out']} tells the rows apart, give "
+                    f"each kind a file. Else: {cure[0].lower()}{cure[1:]}"
+                )
             raise scan.fault(differs, name, problem, cure)
     return np.sort(first)

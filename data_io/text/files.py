@@ -13,6 +13,11 @@ _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 _MICRO = re.compile(
     "(?:\u00e6|\u0192\u00ca|\u00a6\u00cc|\u00c2\u00b5|\u00ce\u00bc)(?=m\\b)"
 )
+# Minus signs and spaces of typesetting
+_TYPESET = {
+    "-": "\u2010\u2011\u2012\u2013\u2014\u2212\ufe63\uff0d",
+    " ": "\u00a0\u2007\u2009\u202f",
+}
 
 
 class NotAMapError(DataFileError):
@@ -41,7 +46,10 @@ def read_texts(path: str | Path) -> list[str]:
     if text is None or _CONTROL.search(text):
         problem = "expected a text file, found binary data"
         raise DataFileError(path, problem, "Give the text export of the instrument.")
-    text = _MICRO.sub("\u00b5", text).replace("\u2212", "-").replace("\u00a0", " ")
+    text = _MICRO.sub("\u00b5", text)
+    for plain, signs in _TYPESET.items():
+        for sign in signs:
+            text = text.replace(sign, plain)
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 

@@ -7,7 +7,7 @@ from pbrdf.errors import DataFileError
 
 # A number that may have a decimal comma
 DECIMAL = re.compile(r"[-+]?\d+(?:,\d+)?(?:[eE][-+]?\d+)?")
-_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
+THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 _COMMA_CELL = re.compile(r"[^\s;]*,[^\s;]*")
 # 05 is no integer but what stands behind a decimal comma
 _SPLIT_DECIMAL = re.compile(r"(?:^|,)[ ]*([-+]?0\d+)[ ]*(?=,|$)", re.MULTILINE)
@@ -50,7 +50,7 @@ def plain_notation(path: str | Path, texts: list[str], delimiter: str | None) ->
     cells = _COMMA_CELL.findall(content)
     if not all(map(DECIMAL.fullmatch, cells)):
         return texts
-    if "." in content or all(map(_THOUSANDS.fullmatch, cells)):
+    if "." in content or all(map(THOUSANDS.fullmatch, cells)):
         problem = f"expected decimal commas or thousands, got {cells[0]!r} for either"
         raise DataFileError(path, problem, "Write decimals with a point.")
     return content.replace(",", ".").split("\n")

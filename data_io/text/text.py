@@ -1,6 +1,5 @@
 """Text files in, with a line number for everything that is wrong in them."""
 
-import re
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -9,15 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from data_io.text.files import read_texts
+from data_io.text.gaps import with_nan
 from data_io.text.notation import DECIMAL, plain_notation, unquoted
 from pbrdf.errors import DataFileError
 
 COMMENT_MARKS = ("#", "%")
-
-# What programs write for a point without height
-_MISSING = re.compile(
-    r"no[ _]?data|\*{2,}|-{2,}|-?1\.#\w+|-?nan\(\w+\)|\bbad\b", re.IGNORECASE
-)
 
 
 class Line(NamedTuple):
@@ -148,7 +143,7 @@ def _blocks(texts: list[str]) -> list[list[int]]:
 
 def _is_words(text: str, first: Line) -> bool:
     """Tell whether a line among data is of words, and not a row with a fault in it."""
-    line = Line(0, _MISSING.sub("nan", text))
+    line = Line(0, with_nan(text))
     cells = line.cells(find_delimiter(line))
     numbers = [is_number(cell) or bool(DECIMAL.fullmatch(cell)) for cell in cells]
     if numbers[0] or not any(cells):
@@ -199,7 +194,7 @@ def _is_data(text: str) -> bool:
     cells = line.cells(delimiter)
     if is_number(cells[0]) or DECIMAL.fullmatch(cells[0]):
         return True
-    cells = Line(0, _MISSING.sub("nan", text)).cells(delimiter)
+    cells = Line(0, with_nan(text)).cells(delimiter)
     return (
         len(cells) > 1 and all(is_number(cell) or not cell for cell in cells) and any(cells)
     )
@@ -236,7 +231,7 @@ def read_numbers(
     delimiter = find_delimiter(data.first)
     block = _block(data.texts, delimiter, columns)
     if block is None and gaps:
-        data = data._replace(texts=[_with_nan(text, delimiter) for text in data.texts])
+        data = data._replace(texts=[with_nan(text, delimiter) for text in data.texts])
         block = _block(data.texts, delimiter, columns)
     if block is not None and gaps:
         # Some programs write infinity for what was not measured
@@ -256,14 +251,6 @@ def _block(
         )
     except ValueError:
         return None
-
-
-def _with_nan(text: str, delimiter: str | None) -> str:
-    """Return a line with nan for what marks a missing point."""
-    text = _MISSING.sub("nan", text)
-    if delimiter is None:
-        return text
-    return delimiter.join(cell.strip() or "nan" for cell in text.split(delimiter))
 
 
 def _first_fault(

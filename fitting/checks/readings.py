@@ -11,7 +11,9 @@ from fitting.checks.finding import Finding
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_limits", "check_noise", "check_repeats", "check_wavelengths"]
+__all__ = [
+    "check_limits", "check_missing", "check_noise", "check_repeats", "check_wavelengths",
+]  # fmt: skip
 
 _REPEATS = 3
 
@@ -142,6 +144,20 @@ def check_repeats(scan: "xr.Dataset") -> list[Finding]:
             )
         )  # fmt: skip
     return found
+
+
+def check_missing(scan: "xr.Dataset") -> list[Finding]:
+    """Count what was not measured, by column."""
+    said = []
+    for name in map(str, scan.data_vars):
+        gaps = int(np.isnan(np.asarray(scan[name].values, float)).sum())
+        if gaps:
+            said.append(f"{gaps} of {scan.sizes['geometry']} of {name}")
+    if not said:
+        return []
+    more = f" and {len(said) - 6} more columns" if len(said) > 6 else ""
+    what = f"readings that are missing: {', '.join(said[:6])}{more}"
+    return [Finding(name="missing", severity="note", what=what)]
 
 
 def check_wavelengths(scan: "xr.Dataset") -> list[Finding]:

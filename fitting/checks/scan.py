@@ -10,6 +10,7 @@ from fitting.checks.finding import Finding, PhysicsError
 from fitting.checks.polarisation import check_polarisation
 from fitting.checks.readings import (
     check_limits,
+    check_missing,
     check_noise,
     check_repeats,
     check_wavelengths,
@@ -51,7 +52,8 @@ def check_scan(scan: "xr.Dataset") -> list[Finding]:
     exchanged
     """
     readings = list(curves_of(scan))
-    findings = [*check_wavelengths(scan), *check_repeats(scan), *check_polarisation(scan)]
+    findings = [*check_wavelengths(scan), *check_repeats(scan), *check_missing(scan)]
+    findings += check_polarisation(scan)
     if readings:
         findings += [*check_exchange(readings), *check_reciprocity(readings)]
         findings += [*check_limits(readings), *check_noise(readings)]

@@ -5,7 +5,7 @@ polarisers, or a ratio of such combinations: the elements divided by M00 (m10 ..
 the degree of linear polarisation. A ratio knows nothing of absolute brightness.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -175,19 +175,21 @@ def _flatten(
     """Flatten one scan."""
     geometry = geometry_of(label, scan)
     known = [*LINEAR, *RATIOS]
-    derived = _derived({str(name) for name in scan.data_vars})
-    names = [name for name in known if name in scan and name not in derived]
+    derived = {}
+    names = [name for name in known if name in scan]
     if use is not None:
         unknown = set(use) - set(known)
         if unknown:
             msg = f"use must name observables, got {sorted(unknown)[0]!r}. Known: {known}."
             raise ValueError(msg)
         names = [name for name in use if name in scan]
+    else:
+        derived = {name: _derived(scan, name) for name in names}
     keep = [mask(scan) for mask in masks]
     columns = []
     for name in names:
         value = real_array(name, scan[name].values)
-        good = np.isfinite(value)
+        good = np.isfinite(value) & ~derived.get(name, np.zeros(value.size, dtype=bool))
         for kept in keep:
             if isinstance(kept, np.ndarray):
                 good = good & kept.astype(bool)
@@ -206,14 +208,32 @@ def _flatten(
     )
 
 
-def _derived(names: set[str]) -> set[str]:
-    """Return the ratios that follow from other readings: they must not count again."""
-    found = set()
-    if "M00" in names:
-        found = {ratio for ratio, element in NORMALISED.items() if element in names}
-    if {"M00", "M10"} <= names or "m10" in names:
-        found.add("DOLP")
+def _derived(scan: "xr.Dataset", name: str) -> np.ndarray:
+    """Tell where a reading follows from others of its row: it must not count again.
+
+    Light behind polarisers comes first, then elements, then ratios.
+    """
+    found = np.zeros(scan.sizes["geometry"], dtype=bool)
+    for others in _follows(name):
+        if set(others) <= set(scan.data_vars):
+            found |= np.logical_and.reduce([np.isfinite(scan[o].values) for o in others])
     return found
+
+
+def _follows(name: str) -> Iterator[tuple[str, ...]]:
+    """Yield the sets of observables that each give one."""
+    if name in LINEAR and not name.startswith("f_"):
+        for group in (("I_s", "I_p"), ("f_ss", "f_sp", "f_ps", "f_pp")):
+            known = set().union(*(LINEAR[one] for one in group))
+            if name not in group and set(LINEAR[name]) <= known:
+                yield group
+    if name in NORMALISED:
+        yield "M00", NORMALISED[name]
+    if name == "DOLP":
+        yield "M00", "M10"
+        yield ("m10",)
+    if name in ("m10", "DOLP"):
+        yield "I_s", "I_p"
 
 
 def _is_relative(label: str, scan: "xr.Dataset") -> bool:

@@ -66,7 +66,7 @@ BAD_SCANS: dict[str, tuple[Callable[[], str | bytes], str]] = {
     "header only": (lambda: SCAN.splitlines()[0] + "\n", "scan.csv"),
     "truncated": (truncated_scan, "line 16"),
     "binary": (lambda: bytes(range(256)) * 4, "scan.csv"),
-    "not a number": (lambda: with_cell(3, 2, "n/a"), "line 4, column M00"),
+    "not a number": (lambda: with_cell(3, 2, "1x"), "line 4, column M00"),
     "infinite": (lambda: with_cell(3, 2, "inf"), "line 4, column M00"),
     "negative": (lambda: with_cell(5, 2, "-0.3"), "line 6, column M00"),
     "below the horizon": (lambda: with_cell(5, 1, "95"), "line 6, column theta_view_deg"),

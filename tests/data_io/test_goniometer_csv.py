@@ -142,7 +142,7 @@ FULL = "theta_i_deg,theta_s_deg,dphi_deg,M00"
         ("AOI,VZA,refl,M00\n30,10,1,1\n", "line 1: expected known columns, got 'VZA', 'refl'; expected the unit of the angles 'AOI'"),
         ("theta_i_deg,theta_s_deg,phi_s_deg,M00\n30,30,180,1\n", "column phi_s_deg: expected the azimuth of the source .*--azimuth-of-forward 0 or 180"),
         (f"{VIEW},m1o\n30,10,1,0\n", "expected known columns, got 'm1o'. Say what they hold by --columns"),
-        (f"{VIEW},M00\n30,10,1,1\n", "line 1, column M00: expected one column of M00, found M00 too"),
+        (f"{VIEW},M00\n30,10,1,2\n", "line 1, column M00: expected one column of M00, found M00 too"),
         ("theta_view_deg,M00\n10,1\n", "column theta_i_deg: expected this column, found none"),
         ("theta_i_deg,M00\n10,1\n", "column theta_s_deg: expected this column"),
         ("theta_i_deg,theta_s_deg,M00\n30,10,1\n", "column dphi_deg: expected this column"),
@@ -152,7 +152,7 @@ FULL = "theta_i_deg,theta_s_deg,dphi_deg,M00"
         (f"{VIEW},DOLP_stderr\n30,10,1,0.1\n", "column DOLP_stderr: expected a column DOLP beside it"),
         (f"{VIEW},wavelength_um,wavelength_nm\n30,10,1,0.5,500\n", "line 1, column wavelength_nm: expected one column of wavelength, found wavelength_um too"),
         # Cells
-        (f"{VIEW}\n30,10,1\n30,20,n/a\n", "line 3, column M00: expected a number, got 'n/a'. Leave gaps"),
+        (f"{VIEW}\n30,10,1\n30,20,1x\n", "line 3, column M00: expected a number, got '1x'. Leave gaps"),
         (f'{VIEW}\n30,10,1\n30,"20,1\n30,30,1\n', "line 3: expected 3 cells as in the header, got 2"),
         (f"{VIEW}\n30,10,1\n30,20\n", "line 3: expected 3 cells as in the header, got 2"),
         (f"{VIEW}\n30,10,1\n30,20,0,5\n", "line 3: expected 3 cells .*, got 4"),

@@ -105,8 +105,8 @@ def test_a_file_without_unit_is_micrometres_and_says_so(tmp_path):
         (b"\x89PNG\r\n\x1a\n\x00\x00\x01", "found binary data"),
         ("just words\n", "found none"),
         (
-            "x_um,z_um\n0,1\n1,n/a\n2,0\n",
-            "line 3, column z_um: expected a finite number.*'n/a'",
+            "x_um,z_um\n0,1\n1,1x\n2,0\n",
+            "line 3, column z_um: expected a finite number.*'1x'",
         ),
         ("x_um,z_um\n0,1\nnan,2\n2,0\n", "line 3, column x: expected a number, got nan"),
         ("x_um,z_um\n0,1\n1,inf\n2,0\n", "expected at least 3 points, got 2"),

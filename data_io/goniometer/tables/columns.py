@@ -1,7 +1,5 @@
 """From named cells to numbers that mean something: every column known, or none is read."""
 
-import difflib
-import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -15,30 +13,18 @@ from data_io.goniometer.scan import STDERR, ConventionWarning
 from data_io.goniometer.tables.names import (
     ANGLES,
     IGNORE,
-    TARGETS,
     Meaning,
+    bare_name,
     meaning_of,
     target_of,
 )
 from data_io.goniometer.tables.table import RawTable
-from pbrdf.errors import DataFileError, shortened
+from data_io.goniometer.tables.text_columns import say_left_out
+from data_io.goniometer.tables.unknown import COLUMNS_CURE, unknown_columns
+from pbrdf.errors import DataFileError
 from pbrdf.optics.published.columns import Column
 
 __all__ = ["Columns", "read_columns"]
-
-_COLUMNS_CURE = (
-    "Known: theta_i_deg; theta_view_deg, or theta_s_deg with dphi_deg, or phi_s_deg with "
-    "phi_i_deg; M00..M33, m01..m33 (divided by M00), DOLP, I_s, I_p, I0..I135, S0..S3; "
-    "<name>_stderr; wavelength_um, wavelength_nm; sample_rotation_deg, "
-    "source_half_angle_deg, detector_half_angle_deg."
-)
-# Where a slip of the pen is told from another quantity by the name alone: not an azimuth,
-# and not a value, of which f_s is no f_ss
-_SUGGESTED = tuple(t for t in TARGETS if t.startswith(("theta", "wavelength", "sample")))
-_ERROR_WORDS = re.compile(
-    r"^u\((.+)\)$|^(.*?)[\s_-]*(?:err|error|unc|uncertainty|sigma|std)$"
-)
-_FROM_ONE = re.compile(r"^m(?:4[1-4]|[1-3]4|[1-4]{2}/m11)$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -57,6 +43,8 @@ class Columns:
         What the file calls them.
     lines : list of int
         Line of each row.
+    left_out : str
+        Names of columns of text.
     """
 
     angles: Mapping[str, np.ndarray]
@@ -64,6 +52,7 @@ class Columns:
     wavelength: np.ndarray | None
     names: Mapping[str, str]
     lines: list[int]
+    left_out: str = ""
 
 
 def read_columns(path: Path, table: RawTable, declared: Declared) -> Columns:
@@ -77,26 +66,27 @@ def read_columns(path: Path, table: RawTable, declared: Declared) -> Columns:
     Warns
     -----
     ConventionWarning
-        If a column of text is left out.
+        If a column of text is left out, a word marks a gap, or a column stands twice.
     """
-    meanings = _meanings(path, table, declared)
+    meanings, text = _meanings(path, table, declared)
     angles: dict[str, pd.Series] = {}
     values: dict[str, dict[float | None, pd.Series]] = {}
     names: dict[str, str] = {}
+    first: dict[tuple[str, float | None], int] = {}
     waves = None
+    read = [k for k, meaning in enumerate(meanings) if meaning.name != IGNORE]
+    table.require_one_notation(path, read)
     for k, meaning in enumerate(meanings):
         if meaning.name == IGNORE:
             continue
         numbers = table.numbers(path, k)
+        _say_gaps(path, table, k)
         key = meaning.name + (STDERR if meaning.stderr else "")
-        taken = key in angles or meaning.wavelength in values.get(key, {})
-        if taken or (key == "wavelength" and waves is not None):
-            problem = f"expected one column of {key}, found {names[key]} too"
-            cure = f"Remove one, or leave it out: --columns {table.names[k]}=ignore."
-            raise DataFileError(
-                path, problem, cure, line=table.header, column=table.names[k]
-            )
-        names[key] = _without_unit_row(table.names[k])
+        if (key, meaning.wavelength) in first:
+            _require_same(path, table, first[key, meaning.wavelength], k, key)
+            continue
+        first[key, meaning.wavelength] = k
+        names[key] = bare_name(table.names[k])
         if key == "wavelength":
             waves = numbers / 1e3 if meaning.unit == "nm" else _to_um(numbers, meaning)
         elif key in ANGLES:
@@ -105,15 +95,18 @@ def read_columns(path: Path, table: RawTable, declared: Declared) -> Columns:
             scaled = numbers / 100.0 if meaning.unit == "%" else numbers
             values.setdefault(key, {})[meaning.wavelength] = scaled
     _require_full(path, table, angles, waves, names)
-    return _long(path, table, angles, values, waves, names)
+    long = _long(path, table, angles, values, waves, names)
+    return replace(long, left_out=", ".join(text))
 
 
-def _meanings(path: Path, table: RawTable, declared: Declared) -> list[Meaning]:
-    """Return what each column holds; refuse what nobody knows, all names at once."""
+def _meanings(
+    path: Path, table: RawTable, declared: Declared
+) -> tuple[list[Meaning], list[str]]:
+    """Return what each column holds, and those of text; refuse what nobody knows."""
     _check_mapping(path, table, declared)
     found: list[Meaning] = []
     unknown, without_unit, text = [], [], []
-    for k, (raw, name) in enumerate(zip(_raw_names(table), table.names, strict=True)):
+    for k, (raw, name) in enumerate(zip(table.bare_names, table.names, strict=True)):
         if raw in declared.columns:
             meaning = target_of(declared.columns[raw])
         else:
@@ -129,14 +122,37 @@ def _meanings(path: Path, table: RawTable, declared: Declared) -> list[Meaning]:
             meaning = replace(meaning, unit=declared.angles)
         found.append(meaning or Meaning(IGNORE))
     if unknown or without_unit:
-        raise _unknown(path, table, unknown, without_unit)
+        raise unknown_columns(path, table, unknown, without_unit)
     _require_one_unit(path, table, found)
     if text:
+        say_left_out(path, table, text)
+    return found, text
+
+
+def _say_gaps(path: Path, table: RawTable, column: int) -> None:
+    """Say how many cells hold a word that means that nothing was measured."""
+    marks = table.marks(column)
+    if marks:
+        words = ", ".join(map(repr, sorted(set(marks))[:5]))
         msg = (
-            f"{path.name}: columns of text are left out: {shortened(', '.join(text), 200)}."
+            f"{path.name}: cells of {table.names[column]} with {words} count as not "
+            f"measured: {len(marks)} of {len(table.lines)}."
         )
-        warnings.warn(msg, ConventionWarning, stacklevel=5)
-    return found
+        warnings.warn(msg, ConventionWarning, stacklevel=6)
+
+
+def _require_same(path: Path, table: RawTable, one: int, other: int, key: str) -> None:
+    """Refuse two columns of one thing, but for one that stands twice."""
+    first, second = (table.names[k] for k in (one, other))
+    if table.numbers(path, one).equals(table.numbers(path, other)):
+        msg = f"{path.name}: {first} and {second} hold the same numbers; one counts."
+        warnings.warn(msg, ConventionWarning, stacklevel=6)
+        return
+    problem = f"expected one column of {key}, found {first} too"
+    cure = f"Remove one, or leave it out: --columns {bare_name(second)}=ignore."
+    if bare_name(first) == bare_name(second):
+        cure = "Remove one, or give it a name of its own."
+    raise DataFileError(path, problem, cure, line=table.header, column=second)
 
 
 def _require_one_unit(path: Path, table: RawTable, meanings: list[Meaning]) -> None:
@@ -150,7 +166,7 @@ def _require_one_unit(path: Path, table: RawTable, meanings: list[Meaning]) -> N
             problem = f"expected a standard error in the unit of {meaning.name}"
             cure = (
                 "A part of each reading is no unit: write the error itself, or leave the "
-                f"column out (--columns {_without_unit_row(name)}=ignore) and let the fit "
+                f"column out (--columns {bare_name(name)}=ignore) and let the fit "
                 "estimate the noise."
             )
             raise DataFileError(path, problem, cure, line=table.header, column=name)
@@ -158,81 +174,17 @@ def _require_one_unit(path: Path, table: RawTable, meanings: list[Meaning]) -> N
 
 def _check_mapping(path: Path, table: RawTable, declared: Declared) -> None:
     """Refuse a mapping of columns that are not there, or to what nobody knows."""
-    absent = [name for name in declared.columns if name not in _raw_names(table)]
+    absent = [name for name in declared.columns if name not in table.bare_names]
     if absent:
         problem = (
             f"expected the columns {', '.join(map(repr, absent))} to rename, found none"
         )
-        cure = f"The file has {', '.join(_raw_names(table))}."
+        cure = f"The file has {', '.join(table.bare_names)}."
         raise DataFileError(path, problem, cure, line=table.header)
     wrong = [to for to in declared.columns.values() if target_of(to) is None]
     if wrong:
         problem = f"expected a known meaning, got {', '.join(map(repr, wrong))}"
-        raise DataFileError(path, problem, f"{_COLUMNS_CURE} Or: ignore.")
-
-
-def _raw_names(table: RawTable) -> list[str]:
-    return [_without_unit_row(name) for name in table.names]
-
-
-def _without_unit_row(name: str) -> str:
-    return re.sub(r"\s*[\[(][^\[\]()]*[\])]$", "", name) or name
-
-
-def _unknown(
-    path: Path, table: RawTable, unknown: list[str], without_unit: list[str]
-) -> DataFileError:
-    """Return the error that names every column without a meaning or a unit."""
-    if "n" in map(str.lower, unknown) and not without_unit:
-        problem = f"expected a scan, got columns {', '.join(map(repr, unknown))}"
-        cure = "Optical constants are given by --material-file, material_file= or file =."
-        raise DataFileError(path, problem, cure, line=table.header)
-    said = []
-    if unknown:
-        said.append(f"expected known columns, got {', '.join(map(repr, unknown))}")
-    if without_unit:
-        listed = ", ".join(map(repr, without_unit))
-        said.append(f"expected the unit of the angles {listed}, found none")
-    pairs, cures = [], []
-    for name in (*unknown, *without_unit):
-        meaning = meaning_of(name)
-        if meaning is not None:
-            pairs.append(f"{name}={meaning.name}_deg")
-        else:
-            pairs += [f"{name}={target}" for target in _close_to(name)]
-    if any(map(_FROM_ONE.match, unknown)):
-        cures.append("Elements are counted from 0 here: --columns M11=M00,M12=M01,...")
-    if pairs:
-        hints = ", ".join(pair.partition("=")[2] for pair in pairs)
-        cures.append(f"Did you mean {hints}? Then give --columns {','.join(pairs)}.")
-    elif not cures:
-        cures.append("Say what they hold by --columns NAME=theta_i_deg, or NAME=ignore.")
-    if without_unit:
-        cures.append("Or give --angles deg or rad for all.")
-    return DataFileError(
-        path, "; ".join(said), " ".join([*cures, _COLUMNS_CURE]), line=table.header
-    )
-
-
-def _close_to(name: str) -> list[str]:
-    """Return the target that a name most likely means, or nothing."""
-    spelled = {_letters(target): target for target in TARGETS}
-    if _letters(name) in spelled:
-        return [spelled[_letters(name)]]
-    error = _ERROR_WORDS.match(name.lower())
-    if error:
-        value = meaning_of(error[1] or error[2] or "M00")
-        return (
-            [f"{value.name}{STDERR}"]
-            if value and f"{value.name}{STDERR}" in TARGETS
-            else []
-        )
-    return difflib.get_close_matches(name, _SUGGESTED, n=1, cutoff=0.8)
-
-
-def _letters(name: str) -> str:
-    # M10 and m10 differ by their case alone
-    return re.sub(r"[^A-Za-z0-9]", "", name)
+        raise DataFileError(path, problem, f"{COLUMNS_CURE} Or: ignore.")
 
 
 def _to_um(numbers: pd.Series, meaning: Meaning) -> pd.Series:
@@ -253,7 +205,7 @@ def _require_full(
         gaps = ~np.isfinite(numbers.to_numpy())
         if gaps.any():
             row = int(gaps.argmax())
-            got = "an empty cell or nan" if np.isnan(numbers.iloc[row]) else "inf"
+            got = "a gap" if np.isnan(numbers.iloc[row]) else "inf"
             problem = f"expected a number in every row, got {got}"
             cure = "Only measured values may be left empty."
             raise DataFileError(

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from data_io.goniometer.scan import QUANTITIES, STDERR
 from pbrdf.optics.published.columns import column_of, unit_of
 
-__all__ = ["ANGLES", "IGNORE", "TARGETS", "Meaning", "meaning_of", "target_of"]
+__all__ = [
+    "ANGLES", "IGNORE", "TARGETS", "Meaning", "bare_name", "meaning_of", "target_of",
+]  # fmt: skip
 
 # What a column may hold beside the quantities; sample_rotation turns the sample
 ANGLES = (
@@ -45,7 +47,8 @@ TARGETS = (
     IGNORE,
 )  # fmt: skip
 
-_ANGLE_UNITS = {"deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "rad": "rad",
+_ANGLE_UNITS = {"deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "º": "deg",
+                "rad": "rad",
                 "radian": "rad", "radians": "rad", "grad": None}  # fmt: skip
 _IN_BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$")
 _DIVIDED = re.compile(r"^[Mm](\d\d)\s*/\s*[Mm]00$|^[Mm](\d\d)_norm(?:alised|alized)?$")
@@ -53,7 +56,7 @@ _DIVIDED = re.compile(r"^[Mm](\d\d)\s*/\s*[Mm]00$|^[Mm](\d\d)_norm(?:alised|aliz
 _AT_WAVELENGTH = re.compile(
     r"^(?:(.+?)[\s_@]+)?(\d+(?:\.\d+)?)\s*(nm|um|µm)$", re.IGNORECASE
 )
-_VALUE_UNITS = {"", "-", "1", "1/sr", "sr-1", "sr^-1", "/sr", "%"}
+_VALUE_UNITS = {"", "-", "1", "1/sr", "sr-1", "sr^-1", "sr⁻¹", "/sr", "%"}
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,8 @@ def meaning_of(name: str) -> Meaning | None:
     Meaning(name='theta_i', unit='rad', stderr=False, wavelength=None)
     >>> meaning_of("M00_450nm")
     Meaning(name='M00', unit=None, stderr=False, wavelength=0.45)
+    >>> meaning_of("M00_450nm_stderr") == meaning_of("M00_stderr_450nm")
+    True
     >>> meaning_of("M10/M00").name, meaning_of("m10_stderr").stderr
     ('m10', True)
     """
@@ -110,13 +115,26 @@ def meaning_of(name: str) -> Meaning | None:
     value = _value(plain, bracket)
     if value:
         return value
-    at = _AT_WAVELENGTH.match(plain)
+    # M00_stderr_450nm or M00_450nm_stderr
+    behind = STDERR if plain.endswith(STDERR) else ""
+    at = _AT_WAVELENGTH.match(plain.removesuffix(STDERR))
     if at:
-        what = _value(at[1] or "M00", bracket)
+        what = _value((at[1] or "M00") + behind, bracket)
         wavelength = float(at[2]) * (1e-3 if at[3].lower() == "nm" else 1.0)
         if what:
             return Meaning(what.name, what.unit, what.stderr, wavelength)
     return None
+
+
+def bare_name(name: str) -> str:
+    """Return a name without a unit in brackets behind it.
+
+    Examples
+    --------
+    >>> bare_name("M00 [1/sr]"), bare_name("[deg]")
+    ('M00', '[deg]')
+    """
+    return re.sub(r"\s*[\[(][^\[\]()]*[\])]$", "", name) or name
 
 
 def _split(name: str) -> tuple[str, str]:

@@ -1,7 +1,7 @@
 """Tables with names of columns: the project's own CSV, and those of others."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from data_io.goniometer.tables.columns import Columns, read_columns
 from data_io.goniometer.tables.counting import require_counted_from_zero
 from data_io.goniometer.tables.names import POLARISERS, STOKES, meaning_of
 from data_io.goniometer.tables.quantities import mueller_elements
+from data_io.goniometer.tables.settings import require_one_setting
 from data_io.goniometer.tables.table import read_table
 from data_io.goniometer.tables.writing import NOTES
 from data_io.text.text import Line, without_comments
@@ -60,6 +61,8 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
         raise DataFileError(path, problem, cure, line=table.header, column="M00")
     head = table.header
     _require_one_source(path, columns, head)
+    require_one_setting(path, table, columns)
+    _require_all_errors(path, columns.values, head)
     values, quantity = mueller_elements(columns.values)
     said = _quantity(path, table.comments)
     if quantity is not None and said is None and declared.quantity is None:
@@ -91,6 +94,7 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
             "title": kept[0] if kept else "",
             "comments": "\n".join(kept),
             **_between_polarisers(columns),
+            **({"left_out": columns.left_out} if columns.left_out else {}),
         },
     )
 
@@ -128,6 +132,21 @@ def _between_polarisers(columns: Columns) -> dict[str, float]:
     one, other = light["I0"] + light["I90"], light["I45"] + light["I135"]
     with np.errstate(invalid="ignore", divide="ignore"):
         return {"polarisers_apart": float(np.nanmedian(2 * (other - one) / (one + other)))}
+
+
+def _require_all_errors(path: Path, values: Mapping[str, np.ndarray], line: int) -> None:
+    """Refuse standard errors of some of the four polarisers: no element has one then."""
+    if not set(POLARISERS) <= values.keys():
+        return
+    stated = [name for name in POLARISERS if name + STDERR in values]
+    lacking = [name + STDERR for name in POLARISERS if name not in stated]
+    if stated and lacking:
+        problem = (
+            f"expected standard errors of all polarisers, found no {', '.join(lacking)}"
+        )
+        ignored = ",".join(f"{name}{STDERR}=ignore" for name in stated)
+        cure = f"Give all four; or let the fit estimate the noise, --columns {ignored}."
+        raise DataFileError(path, problem, cure, line=line)
 
 
 def _require_four(path: Path, values: Iterable[str], line: int) -> None:

@@ -16,6 +16,7 @@ from data_io.goniometer.scan import (
     Scan,
 )
 from data_io.goniometer.tables.names import POLARISERS, STOKES
+from pbrdf.errors import DataFileError
 
 __all__ = ["as_declared", "mueller_elements"]
 
@@ -129,6 +130,13 @@ def _ratios(scan: Scan, declared: Declared) -> tuple[Values, str]:
     within = all(_within_one(values, name) for name in others)
     absent = intensity is None and not set(INTENSITIES) & values.keys() and within
     if declared.normalised or ((unit or absent) and not told):
+        twice = [name for name in others if name.lower() in values]
+        if twice:
+            problem = f"expected one column of {twice[0].lower()}, found {twice[0]} too"
+            cure = (
+                "In 1/sr it needs M00 beside it; or leave one out, --columns NAME=ignore."
+            )
+            raise DataFileError(scan.path, problem, cure, column=twice[0])
         _rename(values, {name: name.lower() for name in others})
         if intensity is not None and _all_one(intensity):
             values.pop("M00")

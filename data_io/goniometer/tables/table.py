@@ -1,23 +1,38 @@
 """Cells of a table under their names, whatever separates them and writes decimals."""
 
-import csv
 import re
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
-from data_io.text.text import Line, is_comment, is_number, without_comments
-from pbrdf.errors import DataFileError
+from data_io.goniometer.scan import ConventionWarning
+from data_io.goniometer.tables.cells import (
+    cells_of,
+    is_plain,
+    numbers_of,
+    require_one_notation,
+    separator_of,
+    sign_behind,
+    without_empty_end,
+)
+from data_io.goniometer.tables.names import bare_name, meaning_of
+from data_io.text.gaps import is_gap
+from data_io.text.text import Line, is_comment, without_comments
+from pbrdf.errors import DataFileError, shortened
 from pbrdf.files import check_columns
+from pbrdf.optics.published.columns import unit_of
 
 __all__ = ["RawTable", "read_table"]
 
-_SEPARATORS = (";", "\t", "|", ",")
-_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
-# What programs write where nothing was measured
-_GAP = {"", "nan", "NaN", "NAN"}
+# How other programs mark a comment; a semicolon only where it separates nothing
+_COMMENT = ("//", "!", "'")
+_UNITS = {
+    "", "-", "1", "deg", "rad", "°", "º", "nm", "um", "µm", "%", "degrees", "1/sr", "sr-1",
+    "sr^-1", "sr⁻¹", "/sr", "radians",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -27,7 +42,8 @@ class RawTable:
     Attributes
     ----------
     names : list of str
-        Names of the columns, with the units that stand in a row below them in brackets.
+        Names of the columns, with the units that stand in a row below them, or behind each
+        number, in brackets.
     cells : DataFrame of str
         One column a name, by position.
     lines : list of int
@@ -36,6 +52,10 @@ class RawTable:
         Line of the names.
     comments : list of str
         Comment lines, and lines above the names.
+    among : list of Line
+        Those of them that stand below the names, where they may tell of rows below them.
+    separator : str or None
+        What separates the cells; None is white space.
     """
 
     names: list[str]
@@ -43,6 +63,13 @@ class RawTable:
     lines: list[int]
     header: int
     comments: list[str]
+    among: list[Line]
+    separator: str | None
+
+    @property
+    def bare_names(self) -> list[str]:
+        """Names without units in brackets, as one types them."""
+        return [bare_name(name) for name in self.names]
 
     def numbers(self, path: Path, column: int) -> pd.Series:
         """Return a column as numbers, NaN for a gap.
@@ -53,25 +80,37 @@ class RawTable:
             For the first cell that is no number.
         """
         text = self.cells.iloc[:, column]
-        if text.str.fullmatch(_DECIMAL_COMMA).any():
-            text = text.str.replace(",", ".", regex=False)
-        values = pd.to_numeric(text.where(~text.isin(_GAP)), errors="coerce")
-        wrong = values.isna() & ~text.isin(_GAP) | text.str.contains("_", regex=False)
+        values, wrong = numbers_of(text)
         if wrong.any():
-            row = int(wrong.to_numpy().argmax())
-            problem = f"expected a number, got {self.cells.iloc[row, column]!r}"
-            cure = "Leave gaps empty."
+            row = int(wrong.argmax())
+            cell = text.iloc[row]
+            problem = f"expected a number, got {cell!r}"
+            cure = "Leave gaps empty; write decimals with a point, without thousands marks."
+            if cell[:1] in ("<", ">", "≤", "≥", "~"):
+                cure = (
+                    "A limit is no reading: write what was read, with its standard error; "
+                    "or leave the cell empty."
+                )
             raise DataFileError(
                 path, problem, cure, line=self.lines[row], column=self.names[column]
             )
-        return values.astype(float)
+        return pd.Series(values, index=text.index)
+
+    def marks(self, column: int) -> list[str]:
+        """Return the words that stand for gaps in a column, one for each of its cells."""
+        text = self.cells.iloc[:, column]
+        plain = {"", "nan"}
+        return [cell for cell in text if is_gap(cell) and cell.lower() not in plain]
 
     def is_text(self, column: int) -> bool:
         """Tell whether no cell of a column is a number, and any says something."""
-        text = self.cells.iloc[:, column]
-        said = text[~text.isin(_GAP)]
-        plain = said.str.replace(",", ".", regex=False)
-        return len(said) > 0 and bool(pd.to_numeric(plain, errors="coerce").isna().all())
+        said = [cell for cell in self.cells.iloc[:, column] if not is_gap(cell)]
+        return bool(said) and not any(map(is_plain, said))
+
+    def require_one_notation(self, path: Path, columns: Iterable[int]) -> None:
+        """Refuse commas in these columns that can be read in two ways."""
+        named = ((self.names[k], self.cells.iloc[:, k]) for k in columns)
+        require_one_notation(path, named, self.lines, self.separator)
 
 
 def read_table(path: Path, lines: Sequence[Line]) -> RawTable:
@@ -79,6 +118,8 @@ def read_table(path: Path, lines: Sequence[Line]) -> RawTable:
 
     The names stand in the last line before the first row of numbers; a row of units may
     stand between them. Semicolon, tab, bar, comma or spaces separate, as the names tell.
+    Comments among the rows are kept; names that are repeated, as where blocks were joined,
+    count once.
 
     Raises
     ------
@@ -94,87 +135,130 @@ def read_table(path: Path, lines: Sequence[Line]) -> RawTable:
         raise DataFileError(path, problem, "The file is truncated.")
     top = next((k for k, line in enumerate(content) if _is_row(line)), len(content))
     if top == 0:
-        first = _cells(content[0].text, _separator(content[0].text))[0]
+        first = cells_of(content[0].text, separator_of(content[0].text))[0]
         problem = f"expected a header line with column names, got {first!r}"
         cure = "Name the columns in the first line."
         raise DataFileError(path, problem, cure, line=content[0].number)
-    head, rows = _header(content, top), content[top:]
-    if not rows:
+    head = _header(content, top)
+    if not content[top:]:
         problem = "expected rows below the header, found none"
         cure = "The file is truncated, or its rows do not begin with a number."
         raise DataFileError(path, problem, cure, line=head.number)
-    separator = _separator(head.text)
-    names = _cells(head.text, separator)
-    units = content[content.index(head) + 1 : top]
-    if units:
-        below = _cells(units[0].text, separator)
-        if len(below) == len(names):
-            names = [
-                f"{name} [{unit.strip('[]()')}]" if unit.strip("[]() -") else name
-                for name, unit in zip(names, below, strict=True)
-            ]
-    split = [_cells(line.text, separator) for line in rows]
-    # A separator at the end of every line is an empty last column
-    if not names[-1] and all(len(row) <= len(names) and not row[-1] for row in split):
-        names, split = names[:-1], [row[: len(names) - 1] for row in split]
-    for line, row in zip(rows, split, strict=True):
-        if len(row) != len(names):
-            problem = f"expected {len(names)} cells as in the header, got {len(row)}"
+    separator = separator_of(head.text)
+    above = content[: content.index(head)]
+    between = content[len(above) + 1 : top]
+    names = cells_of(head.text, separator)
+    heads = [names, *(cells_of(line.text, separator) for line in between)]
+    rows, among = _rows(path, content[top:], heads, separator)
+    among += [line for line in lines if is_comment(line) and line.number > head.number]
+    while len(names) > 1 and not names[-1] and not any(row[-1] for _, row in rows):
+        names = names[:-1]
+        rows = [(line, row[:-1]) for line, row in rows]
+    if between:
+        names = _with_units(names, heads[1])
+    cells = pd.DataFrame([row for _, row in rows], dtype=str)
+    return RawTable(
+        names=_with_signs(names, cells),
+        cells=cells,
+        lines=[line.number for line, _ in rows],
+        header=head.number,
+        comments=[*comments, *(line.text.strip() for line in above)],
+        among=among,
+        separator=separator,
+    )
+
+
+def _rows(
+    path: Path, content: Sequence[Line], heads: Sequence[list[str]], separator: str | None
+) -> tuple[list[tuple[Line, list[str]]], list[Line]]:
+    """Return the cells of each row, and the lines of words among them."""
+    width = len(heads[0])
+    rows: list[tuple[Line, list[str]]] = []
+    words: list[Line] = []
+    for line in content:
+        if line.text.lstrip().startswith(_COMMENT) or (
+            separator != ";" and line.text.lstrip().startswith(";")
+        ):
+            words.append(line)
+            continue
+        row = without_empty_end(cells_of(line.text, separator), width)
+        if row in heads:
+            continue
+        said = [cell for cell in row if cell]
+        if len(said) == 1 and not re.search(r"\d", said[0]):
+            text = shortened(said[0], 40)
+            msg = f"{path.name}: line {line.number}, {text!r}, is left out as a remark."
+            warnings.warn(msg, ConventionWarning, stacklevel=6)
+            words.append(line)
+            continue
+        if not any(map(is_plain, said)) and not all(map(is_gap, said)):
+            problem = f"expected a row of numbers, got {shortened(line.text.strip(), 60)!r}"
+            cure = (
+                "Begin remarks with #; what a line says of the rows below it belongs into "
+                "a column, another table into a file of its own."
+            )
+            raise DataFileError(path, problem, cure, line=line.number)
+        if len(row) != width:
+            problem = f"expected {width} cells as in the header, got {len(row)}"
             cure = "The row is truncated, has extra cells, or decimals have commas."
             raise DataFileError(path, problem, cure, line=line.number)
-    above = [line.text.strip() for line in content[: content.index(head)]]
-    return RawTable(
-        names=names,
-        cells=pd.DataFrame(split, dtype=str),
-        lines=[line.number for line in rows],
-        header=head.number,
-        comments=[*comments, *above],
-    )
+        rows.append((line, row))
+    return rows, words
+
+
+def _with_units(names: Sequence[str], below: Sequence[str]) -> list[str]:
+    """Return names with the units of the row below them in brackets."""
+    if len(below) < len(names):
+        return list(names)
+    return [
+        f"{name} [{unit.strip('[]()')}]" if unit.strip("[]() -") else name
+        for name, unit in zip(names, below, strict=False)
+    ]
+
+
+def _with_signs(names: Sequence[str], cells: pd.DataFrame) -> list[str]:
+    """Take signs of units from the cells into the names, in place; return the names."""
+    found = list(names)
+    for k, name in enumerate(names):
+        bare, unit = sign_behind(cells.iloc[:, k])
+        meaning = meaning_of(name)
+        said = meaning.unit if meaning else None
+        # A unit of the name's own that says something else leaves the sign to be refused
+        if unit and said in (None, unit):
+            cells.isetitem(k, bare.to_numpy())
+            found[k] = name if said else f"{name} [{unit}]"
+    return found
 
 
 def _header(content: Sequence[Line], top: int) -> Line:
     """Return the line of the names: above the rows, and above a line of units."""
     head = content[top - 1]
     if top > 1:
-        separator = _separator(head.text)
-        units = _cells(head.text, separator)
-        above = _cells(content[top - 2].text, separator)
-        if len(above) == len(units) > 1 and all(map(_is_unit, units)):
+        separator = separator_of(head.text)
+        units = cells_of(head.text, separator)
+        above = cells_of(content[top - 2].text, separator)
+        named = any(map(_is_known, above)) and not any(map(_is_known, units))
+        if len(above) == len(units) > 1 and (named or all(map(_is_unit, units))):
             return content[top - 2]
     return head
 
 
+def _is_known(cell: str) -> bool:
+    """Tell whether a cell names something, and not a unit alone."""
+    return unit_of(cell) is None and meaning_of(cell) is not None
+
+
 def _is_unit(cell: str) -> bool:
-    plain = cell.strip().strip("[]()").lower()
-    return plain in {"", "-", "1", "deg", "rad", "°", "nm", "um", "µm", "%", "degrees",
-                     "1/sr", "sr-1", "sr^-1", "/sr", "radians"}  # fmt: skip
+    return cell.strip().strip("[]()").lower() in _UNITS
 
 
 def _is_row(line: Line) -> bool:
     """Tell whether a line is one of numbers: its first cell that says anything is one."""
-    cells = _cells(line.text, _separator(line.text))
-    first = next((cell for cell in cells if cell), "")
-    numbers = sum(is_number(cell.replace(",", ".")) for cell in cells if cell)
-    return is_number(first.replace(",", ".")) or 2 * numbers > sum(map(bool, cells))
-
-
-def _separator(text: str) -> str | None:
-    """Return what separates the cells of a line; None is white space."""
-    words = text.split()
-    if len(words) > 1 and all(map(_DECIMAL_COMMA.fullmatch, words)):
-        return "\t" if "\t" in text else None
-    unquoted = re.sub(r'"[^"]*"', "", text)
-    return next((mark for mark in _SEPARATORS if mark in unquoted), None)
-
-
-def _cells(text: str, separator: str | None) -> list[str]:
-    """Return the cells of a line, without the quotes that spreadsheets put round them."""
-    if separator is None:
-        return text.split()
-    try:
-        cells = next(
-            csv.reader([text.strip(" ")], delimiter=separator, skipinitialspace=True)
-        )
-    except (csv.Error, StopIteration):
-        cells = text.split(separator)
-    return [cell.strip() for cell in cells]
+    cells = [cell for cell in cells_of(line.text, separator_of(line.text)) if cell]
+    numbers = sum(map(is_plain, cells))
+    if not numbers:
+        return False
+    # Wavelengths may head columns beside a name
+    return is_plain(cells[0]) or (
+        2 * numbers > len(cells) and not any(map(_is_known, cells))
+    )

@@ -1,0 +1,74 @@
+"""Columns of text beside the numbers: remarks, or what tells rows apart."""
+
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+from data_io.goniometer.scan import ConventionWarning
+from data_io.goniometer.tables.names import bare_name
+from data_io.goniometer.tables.table import RawTable
+from data_io.text.gaps import is_gap
+from pbrdf.errors import DataFileError, shortened
+
+__all__ = ["say_left_out"]
+
+# Light along e_s and along e_p
+_POLARISATIONS = {
+    "s": "s", "te": "s", "perpendicular": "s", "senkrecht": "s", "s-pol": "s",
+    "p": "p", "tm": "p", "parallel": "p", "p-pol": "p",
+    "ss": "ss", "sp": "sp", "ps": "ps", "pp": "pp",
+}  # fmt: skip
+_UNPOLARISED = {"u", "unpol", "unpol.", "unpolarised", "unpolarized", "none"}
+# Remarks are many or alike; a few words that come again tell rows apart
+_SHOWN = 4
+
+
+def say_left_out(path: Path, table: RawTable, names: Sequence[str]) -> None:
+    """Warn that columns of text are left out, with what they say.
+
+    Raises
+    ------
+    DataFileError
+        If one holds the polarisation of each row, which no element is free of.
+
+    Warns
+    -----
+    ConventionWarning
+        With the words of each column.
+    """
+    said = []
+    for name in names:
+        text = table.cells.iloc[:, table.names.index(name)]
+        words = list(dict.fromkeys(cell for cell in text if not is_gap(cell)))
+        _refuse_polarisation(path, table, name, words)
+        listed = ", ".join(repr(shortened(word, 20)) for word in words[:_SHOWN])
+        more = f" and {len(words) - _SHOWN} more" if len(words) > _SHOWN else ""
+        said.append(f"{name} ({listed}{more})")
+    msg = f"{path.name}: columns of text are left out: {shortened(', '.join(said), 240)}."
+    warnings.warn(msg, ConventionWarning, stacklevel=6)
+
+
+def _refuse_polarisation(
+    path: Path, table: RawTable, name: str, words: Sequence[str]
+) -> None:
+    """Refuse rows of single polarisations, which are read from columns."""
+    plain = [word.lower() for word in words]
+    known = [word for word in plain if word in _POLARISATIONS]
+    named = "pol" in name.lower()
+    if not known or not (named or len(known) == len(plain)):
+        if not named or all(word in _UNPOLARISED for word in plain):
+            return
+        known = plain
+    bare = bare_name(name)
+    problem = f"expected no polarisation by rows, got {', '.join(map(repr, words[:6]))}"
+    cure = (
+        "Give each polarisation a column of its own, I_s and I_p (or f_ss, f_sp, f_ps, "
+        f"f_pp); --columns {bare}=ignore if the rows do not differ by it."
+    )
+    one = {_POLARISATIONS.get(word, "") for word in known}
+    if len(words) == 1 and one and len(letter := one.pop()) == 1:
+        cure = (
+            f"The readings are light of one polarisation: --columns NAME=I_{letter},"
+            f"{bare}=ignore."
+        )
+    raise DataFileError(path, problem, cure, line=table.header, column=name)

@@ -1,0 +1,121 @@
+"""What to say of columns that nobody knows, or whose unit nobody tells."""
+
+import difflib
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from data_io.goniometer.scan import STDERR
+from data_io.goniometer.tables.names import ANGLES, TARGETS, bare_name, meaning_of
+from data_io.goniometer.tables.table import RawTable
+from pbrdf.errors import DataFileError
+
+__all__ = ["COLUMNS_CURE", "unknown_columns"]
+
+COLUMNS_CURE = (
+    "Known: theta_i_deg; theta_view_deg, or theta_s_deg with dphi_deg, or phi_s_deg with "
+    "phi_i_deg; M00..M33, m01..m33 (divided by M00), DOLP, I_s, I_p, I0..I135, S0..S3; "
+    "<name>_stderr; wavelength_um, wavelength_nm; sample_rotation_deg, "
+    "source_half_angle_deg, detector_half_angle_deg."
+)
+# Where a slip of the pen is told from another quantity by the name alone: not an azimuth,
+# and not a value, of which f_s is no f_ss
+_SUGGESTED = tuple(t for t in TARGETS if t.startswith(("theta", "wavelength", "sample")))
+_ERROR_WORDS = re.compile(
+    r"^u\((.+)\)$|^(.*?)[\s_-]*(?:err|error|unc|uncertainty|sigma|std)$"
+)
+_FROM_ONE = re.compile(r"^m(?:4[1-4]|[1-3]4|[1-4]{2}/m11)$", re.IGNORECASE)
+
+
+def unknown_columns(
+    path: Path, table: RawTable, unknown: Sequence[str], without_unit: Sequence[str]
+) -> DataFileError:
+    """Return the error that names every column without a meaning or a unit."""
+    if "n" in map(str.lower, unknown) and not without_unit:
+        problem = f"expected a scan, got columns {', '.join(map(repr, unknown))}"
+        cure = "Optical constants are given by --material-file, material_file= or file =."
+        raise DataFileError(path, problem, cure, line=table.header)
+    said = []
+    if unknown:
+        said.append(f"expected known columns, got {', '.join(map(repr, unknown))}")
+    if without_unit:
+        listed = ", ".join(map(repr, without_unit))
+        said.append(f"expected the unit of the angles {listed}, found none")
+    cures = _cures(unknown, without_unit)
+    return DataFileError(
+        path, "; ".join(said), " ".join([*cures, COLUMNS_CURE]), line=table.header
+    )
+
+
+def _cures(unknown: Sequence[str], without_unit: Sequence[str]) -> list[str]:
+    """Return what the reader may do about these columns."""
+    pairs, cures = [], []
+    for name in (*unknown, *without_unit):
+        meaning = meaning_of(name)
+        if meaning is not None:
+            pairs.append(f"{name}={meaning.name}_deg")
+        else:
+            pairs += [f"{name}={target}" for target in _close_to(name)]
+    cures += [text for name in unknown if (text := _of_unit(name))]
+    waves = [f"{name}=M00_{size}" for name in unknown if (size := _as_wavelength(name))]
+    if waves:
+        cures.append(f"Where wavelengths head columns, give --columns {','.join(waves)}.")
+    if any(map(_FROM_ONE.match, unknown)):
+        cures.append("Elements are counted from 0 here: --columns M11=M00,M12=M01,...")
+    if pairs:
+        hints = ", ".join(pair.partition("=")[2] for pair in pairs)
+        cures.append(f"Did you mean {hints}? Then give --columns {','.join(pairs)}.")
+    elif not cures:
+        cures.append("Say what they hold by --columns NAME=theta_i_deg, or NAME=ignore.")
+    if without_unit:
+        cures.append("Or give --angles deg or rad for all.")
+    return cures
+
+
+def _close_to(name: str) -> list[str]:
+    """Return the target that a name most likely means, or nothing."""
+    spelled = {_letters(target): target for target in TARGETS}
+    if _letters(name) in spelled:
+        return [spelled[_letters(name)]]
+    error = _ERROR_WORDS.match(name.lower())
+    if error:
+        value = meaning_of(error[1] or error[2] or "M00")
+        return (
+            [f"{value.name}{STDERR}"]
+            if value and f"{value.name}{STDERR}" in TARGETS
+            else []
+        )
+    return difflib.get_close_matches(name, _SUGGESTED, n=1, cutoff=0.8)
+
+
+def _of_unit(name: str) -> str:
+    """Return what to do about a known name whose unit is unknown, or nothing."""
+    bare = bare_name(name)
+    meaning = meaning_of(bare) if bare != name else None
+    if meaning is None:
+        return ""
+    if meaning.name in ANGLES:
+        return f"{name} is no angle in degrees or radians: convert it."
+    return (
+        f"{name} is not in 1/sr: give --columns {bare}={bare} with --quantity relative, or "
+        "what it is."
+    )
+
+
+def _as_wavelength(name: str) -> str:
+    """Return a bare number as a wavelength with its unit, or nothing.
+
+    >>> _as_wavelength("450"), _as_wavelength("0.65"), _as_wavelength("7")
+    ('450nm', '0.65um', '')
+    """
+    if not re.fullmatch(r"\d+(?:\.\d+)?", name):
+        return ""
+    size = float(name)
+    if 150.0 <= size <= 30_000.0:
+        return f"{name}nm"
+    return f"{name}um" if "." in name and 0.15 <= size <= 30.0 else ""
+
+
+def _letters(name: str) -> str:
+    # M10 and m10 differ by their case alone
+    return re.sub(r"[^A-Za-z0-9]", "", name)

@@ -1,0 +1,175 @@
+"""Scans as other programs write them: read right, or refused with what would mend them."""
+
+# One line a file: the tables are read across
+# ruff: noqa: E501
+
+import warnings
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from data_io import ConventionWarning, read_goniometer
+from fitting import check_scan
+from fitting.readings.observations import observe
+from pbrdf.errors import DataFileError
+
+HEAD = "theta_i_deg,theta_view_deg,M00\n"
+
+
+def read(tmp_path, text, **more):
+    (tmp_path / "scan.csv").write_text(text, encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConventionWarning)
+        return read_goniometer(tmp_path / "scan.csv", **more)
+
+
+@pytest.mark.parametrize(
+    "mark", ["n/a", "NA", "--", "nan", "", "-", "#N/A", "No Data", "null", "—", "***"]
+)
+def test_marks_of_gaps_are_missing_readings(tmp_path, mark):
+    scan = read(tmp_path, f"{HEAD}30,10,0.05\n30,20,{mark}\n30,30,0.07\n")
+    assert_allclose(scan.M00, [0.05, np.nan, 0.07])
+    with pytest.raises(DataFileError, match=r"line 3.*theta_view_deg.*got a gap"):
+        read(tmp_path, f"{HEAD}30,10,0.05\n30,{mark or 'nan'},0.06\n")
+
+
+def test_words_for_gaps_are_counted(tmp_path):
+    (tmp_path / "s.csv").write_text(f"{HEAD}30,10,NA\n30,20,--\n30,30,0.07\n")
+    with pytest.warns(ConventionWarning, match="'--', 'NA' count as not measured: 2 of 3"):
+        scan = read_goniometer(tmp_path / "s.csv")
+    notes = [finding.what for finding in check_scan(scan) if finding.name == "missing"]
+    assert notes == ["readings that are missing: 2 of 3 of M00"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"{HEAD}30,10,0.05,\n30,20,0.06\n30.5,30,0.07,,\n",
+        f"{HEAD}30,10,0.05\n# lamp changed\n30,20,0.06\n  // note 2\n! x\n; y\n30.5,30,0.07\nEND\n",
+        f"{HEAD}30,10,0.05\n\n{HEAD}30,20,0.06\n30.5,30,0.07\n",
+        "theta_i_deg theta_view_deg M00\n30 10 0,05\n30 20 0,06\n30,5 30 0,07\n",
+        "theta_i_deg theta_view_deg M00\n30,0 10,0 0,05\n30 20 0,06\n30,5 30 0,07\n",
+        "sep=;\ntheta_i_deg;theta_view_deg;M00\n30;10;0,05\n30;20;0,06\n30,5;30;0,07\n",
+        'theta_i_deg,theta_view_deg,M00\n"30","10","0,05"\n"30","20","0,06"\n"30,5","30","0,07"\n',
+        "theta_i,theta_view,M00\n30°,10°,5%\n30°,20°,6 %\n30.5°,30°,7%\n",
+        "theta_i;theta_view;M00\n[º];[º];[sr⁻¹]\n30;10;.05\n30;20;.06\n30.5;30;.07\n",
+        "theta_i_deg,theta_view_deg,M00,M00\n30,10,0.05,0.05\n30,20,0.06,0.06\n30.5,30,0.07,0.07\n",
+        "date;theta_i_deg;theta_view_deg;M00\n01.02.2024;30;10;0,05\n01.02.2024;30;20;0,06\n02.02.2024;30,5;30;0,07\n",
+    ],
+)
+def test_ways_to_write_one_scan(tmp_path, text):
+    scan = read(tmp_path, text)
+    assert_allclose(np.degrees(scan.theta_i), [30, 30, 30.5])
+    assert_allclose(np.degrees(scan.theta_s), [10, 20, 30])
+    assert_allclose(scan.M00, [0.05, 0.06, 0.07])
+
+
+def test_minus_signs_of_typesetting(tmp_path):
+    scan = read(tmp_path, f"{HEAD}30,\u221210,0.05\n30,\u201320,0.06\n")
+    assert_allclose(np.degrees(scan.theta_s), [10, 20])
+    assert_array_equal(scan.dphi, [0, 0])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (f"{HEAD}30,10,<0.001\n", "line 2, column M00: .*'<0.001'. A limit is no reading"),
+        (f"{HEAD}30,10,1'234\n", "without thousands marks"),
+        ("theta_i_deg;theta_view_deg;M00\n30;10;1,234\n30;20;950\n", "decimal commas or thousands, got '1,234' for either"),
+        ("theta_i_deg;theta_view_deg;M00\n30.0;10;0,05\n", "got '0,05' beside '30.0'"),
+        ("theta_i_deg,theta_view_deg,M00,M10\n30,10,0,05\n30,20,0,06\n", "'05' stands behind a decimal one. Separate columns by semicolons"),
+        (f"{HEAD}30,10,0.05\n# 450 nm\n30,20,0.06\n# 650 nm\n30,30,0.07\n", "line 5: expected one wavelength, .*450 nm, 650 nm.*column wavelength_nm"),
+        (f"# p-polarised\n{HEAD}30,10,0.05\n# s-polarised\n30,20,0.06\n", "expected one polarisation"),
+        (f"{HEAD}30,10,0.05\nWavelength 650\n30,20,0.06\n", "line 3: expected a row of numbers, got 'Wavelength 650'. Begin remarks with #"),
+        (f"{HEAD}30,10,0.05\ntheta_i_deg,theta_view_deg,DOLP\n30,20,0.06\n", "line 3: expected a row of numbers.*another table"),
+        ("theta_i_deg,theta_view_deg,pol,M00\n30,10,s,0.05\n30,10,p,0.04\n", "column pol: expected no polarisation by rows, got 's', 'p'. Give each polarisation a column"),
+        ("theta_i_deg,theta_view_deg,pol,M00\n30,10,s,0.05\n30,20,s,0.04\n", "light of one polarisation: --columns NAME=I_s,pol=ignore"),
+        ("theta_i_deg,theta_view_deg,sample,M00\n30,10,A,0.05\n30,10,B,0.04\n", "text of sample tells the rows apart"),
+        ("theta_i_deg,theta_view_deg,450,550,650\n30,10,0.05,0.06,0.07\n", "--columns 450=M00_450nm,550=M00_550nm,650=M00_650nm"),
+        ("theta_i_deg,theta_view_deg,M00\ndeg,deg,counts\n30,10,0.05\n", r"M00 \[counts\] is not in 1/sr: give --columns M00=M00 with --quantity relative"),
+        ("theta_i_deg,theta_view_deg,M00,M00\n30,10,0.05,0.06\n", "expected one column of M00, found M00 too. Remove one, or give it a name"),
+        ("theta_i_deg,theta_view_deg,M10,m10\n30,10,0.01,0.2\n", "expected one column of m10, found M10 too"),
+        ("theta_i_deg,theta_view_deg,I0,I45,I90,I135,I0_stderr,I90_stderr\n30,10,3,2,1,2,0.1,0.1\n", "found no I45_stderr, I135_stderr. Give all four; .*I0_stderr=ignore,I90_stderr=ignore"),
+    ],
+)  # fmt: skip
+def test_refusals_name_the_cure(tmp_path, text, message):
+    with pytest.raises(DataFileError, match=message):
+        read(tmp_path, text)
+
+
+def test_wavelengths_over_columns_with_errors(tmp_path):
+    head = (
+        "theta_i_deg,theta_view_deg,M00_450nm,M00_450nm_stderr,M00_650nm,M00_stderr_650nm\n"
+    )
+    scan = read(tmp_path, f"{head}30,10,0.05,0.001,0.07,0.002\n")
+    assert_allclose(scan.wavelength, [0.45, 0.65])
+    assert_allclose(scan.M00_stderr, [0.001, 0.002])
+    text = "theta_i_deg,theta_view_deg,450,550,650\n30,10,0.05,0.06,0.07\n"
+    named = {f"{wave}": f"M00_{wave}nm" for wave in (450, 550, 650)}
+    scan = read(tmp_path, text, columns=named)
+    assert_allclose(scan.wavelength, [0.45, 0.55, 0.65])
+
+
+def polarised(noise=0.0, rows=30, **wrong):
+    """A table of light that columns tell in several ways, with a row of it changed."""
+    rng = np.random.default_rng(1)
+    view = np.linspace(-60, 60, rows)
+    m00 = 0.05 + 0.2 * np.exp(-(((view - 30) / 15) ** 2))
+    m10 = 0.3 * m00 * np.cos(np.radians(view)) ** 2
+    table = {
+        "M00": m00, "M10": m10, "I_s": (m00 + m10) / 2, "I_p": (m00 - m10) / 2,
+        "m10": m10 / m00,
+    }  # fmt: skip
+    for name, column in table.items():
+        scale = 1.0 if name == "m10" else m00
+        table[name] = column + noise * scale * rng.standard_normal(rows)
+    for name, (row, factor) in wrong.items():
+        table[name][row] *= factor
+    return view, table
+
+
+def write(view, table, names, stderr=0.0):
+    named = [*names, *(f"{name}_stderr" for name in names if stderr)]
+    lines = [",".join(["theta_i_deg", "theta_view_deg", *named])]
+    for k, angle in enumerate(view):
+        cells = [30.0, angle, *(table[name][k] for name in names)]
+        cells += [
+            stderr * (1.0 if name == "m10" else table["M00"][k]) for name in names if stderr
+        ]
+        lines.append(",".join(f"{cell:.9g}" for cell in cells))
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("names", "rule"),
+    [
+        (("M00", "I_s", "I_p"), r"M00: expected I_s \+ I_p = "),
+        (("M10", "I_s", "I_p"), "M10: expected I_s - I_p = "),
+        (("M00", "M10", "m10"), "M10: expected m10 M00 = "),
+        (("m10", "I_s", "I_p"), r"m10: expected \(I_s - I_p\)/\(I_s \+ I_p\) = "),
+    ],
+)
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize("stated", [True, False])
+def test_columns_that_contradict_each_other(tmp_path, names, rule, noise, stated):
+    stderr = noise if stated else 0.0
+    view, table = polarised(noise)
+    read(tmp_path, write(view, table, names, stderr))
+    # One slip in a row, and a wrong scale of all
+    view, table = polarised(noise, **{names[0]: (7, 3.0)})
+    with pytest.raises(DataFileError, match=f"line 9, column {rule}"):
+        read(tmp_path, write(view, table, names, stderr))
+    view, table = polarised(noise, **{names[0]: (slice(None), 1.8)})
+    with pytest.raises(DataFileError, match=f"column {rule}.*rows differ"):
+        read(tmp_path, write(view, table, names, stderr))
+
+
+def test_light_that_columns_tell_twice_counts_once(tmp_path):
+    view, table = polarised()
+    table["I_p"][3] = np.nan
+    scan = read(tmp_path, write(view, table, ("M00", "M10", "I_s", "I_p", "m10")))
+    found = observe({"scan": scan})
+    count = {name: int((found.name == name).sum()) for name in found.names}
+    # Of the row without I_p the elements count, and I_s follows from them
+    assert count == {"I_s": 30, "I_p": 29, "M00": 1, "M10": 1}
