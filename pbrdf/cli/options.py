@@ -25,6 +25,7 @@ __all__ = [
     "Kind",
     "KindOption",
     "MaterialFile",
+    "MaterialIgnore",
     "MendOption",
     "OptionalIndex",
     "Output",
@@ -188,8 +189,13 @@ OptionalIndex = Annotated[
     typer.Option("--n", min=0.01, max=1e6, help="Real part of the refractive index."),
 ]
 Kappa = Annotated[
-    float,
-    typer.Option(min=0.0, max=1e3, help="Imaginary part, n + i kappa; positive absorbs."),
+    float | None,
+    typer.Option(
+        min=0.0,
+        max=1e3,
+        help="Imaginary part, n + i kappa; positive absorbs. 0 unless a file has it.",
+        show_default=False,
+    ),
 ]
 MaterialFile = Annotated[
     str | None,
@@ -197,6 +203,13 @@ MaterialFile = Annotated[
         "--material-file",
         help="Optical constants in place of --n and --kappa: CSV, YAML, .nk, or "
         "refractiveindex:shelf/book/page.",
+    ),
+]
+MaterialIgnore = Annotated[
+    str,
+    typer.Option(
+        "--material-ignore",
+        help="Columns of that file to leave out, separated by commas.",
     ),
 ]
 Wavelength = Annotated[

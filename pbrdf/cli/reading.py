@@ -1,6 +1,6 @@
 """Read what a user calls a surface: a profile, a map or a micrograph."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -141,7 +141,12 @@ def read_scan(
 
 
 def read_material(
-    n: float | None, kappa: float, file: str | None, *, option: str = "--n"
+    n: float | None,
+    kappa: float | None,
+    file: str | None,
+    ignore: Sequence[str] = (),
+    *,
+    option: str = "--n",
 ) -> "Material | None":
     """Return the material of --n and --kappa or of --material-file; None without either.
 
@@ -149,15 +154,28 @@ def read_material(
     ------
     ValueError
         If both are given, or the file cannot be read.
+
+    Warns
+    -----
+    AccuracyWarning
+        If nothing gives kappa, and the index is not that of a transparent medium.
     """
     from pbrdf import Material, materials
+    from pbrdf.optics.published.transparency import warn_if_absorbing
 
     if file is not None:
-        if n is not None or kappa:
-            msg = f"{option} and --kappa come from the --material-file, got both. Drop one."
+        if n is not None:
+            msg = f"{option} comes from the --material-file, got both. Drop one."
             raise ValueError(msg)
-        return materials.read(file)
-    return None if n is None else Material(n, kappa)
+        return materials.read(file, ignore=ignore, kappa=kappa)
+    if ignore:
+        msg = "--material-ignore names columns of a --material-file, got none. Drop it."
+        raise ValueError(msg)
+    if n is None:
+        return None
+    if kappa is None:
+        warn_if_absorbing(f"{option} {n:g}", n)
+    return Material(n, kappa or 0.0)
 
 
 def _kind(path: Path, columns: str | None, block: int | None) -> Kind:

@@ -16,12 +16,15 @@ from pbrdf.optics.materials import Material
 from pbrdf.optics.published import read, read_constant
 from pbrdf.optics.published.formulas import Formula
 from pbrdf.optics.published.package import PREFIX, Entry
+from pbrdf.optics.published.transparency import warn_if_absorbing
 
 CONSTANTS = ("n", "kappa", "diffuse_albedo")
 # Whole numbers beyond this are no measurement; a float of TOML is never larger
 LARGEST = 10**300
 _OF_A_CONSTANT = ("wavelength_um", "values", "formula", "coefficients", "range_um")
-MATERIAL_KEYS = {"material", *CONSTANTS, "wavelength_um", "name", "file", "absorbs_all"}
+MATERIAL_KEYS = {
+    "material", *CONSTANTS, "wavelength_um", "name", "file", "ignore", "absorbs_all",
+}  # fmt: skip
 
 
 def required(document: Mapping[str, Any], name: str, source: Path) -> dict[str, Any]:
@@ -164,9 +167,10 @@ def _read_constant(key: str, value: Any, place: str, source: Path) -> Any:
 
 def _of_table(key: str, value: dict[str, Any], place: str, source: Path) -> Any:
     """Read a constant from a table of its own."""
-    if value.keys() == {"file"}:
+    if "file" in value and value.keys() <= {"file", "ignore"}:
         where = f"[{place}] {key}"
-        return read_constant(_constants_file(value["file"], where, source), key)
+        file = _constants_file(value["file"], where, source)
+        return read_constant(file, key, _ignored(value, where, source))
     if value.keys() == {"wavelength_um", "values"}:
         return Table.of(key, value["wavelength_um"], value["values"])
     if key == "n" and value.keys() == {"formula", "coefficients", "range_um"}:
@@ -175,7 +179,7 @@ def _of_table(key: str, value: dict[str, Any], place: str, source: Path) -> Any:
             raise ValueError(msg)
         low, high = value["range_um"]
         return Formula(value["formula"], tuple(value["coefficients"]), (low, high))
-    known = "wavelength_um and values, or file"
+    known = "wavelength_um and values, or file, or file and ignore"
     known += ", or formula, coefficients and range_um" if key == "n" else ""
     msg = f"{key} must have the keys {known}, got {', '.join(map(repr, value))}."
     raise ValueError(msg)
@@ -194,8 +198,16 @@ def read_material(table: Mapping[str, Any], place: str, source: Path) -> Materia
         return library.get(table["material"])
     if "file" in table:
         return _material_of_file(table, place, source)
+    return _material_of_constants(table, place, source)
+
+
+def _material_of_constants(table: dict[str, Any], place: str, source: Path) -> Material:
+    """Read a material from its constants, each a number, a list or a table of its own."""
     if "n" not in table:
         raise DataFileError(source, f"[{place}]: key 'n' is missing", "Or give 'material'.")
+    if "ignore" in table:
+        problem = f"[{place}]: 'ignore' stands without 'file'"
+        raise DataFileError(source, problem, "It names columns of a file to leave out.")
     for key in CONSTANTS:
         if key in table:
             table[key] = _read_constant(key, table[key], place, source)
@@ -212,20 +224,38 @@ def read_material(table: Mapping[str, Any], place: str, source: Path) -> Materia
     check_numbers(table, ("wavelength_um",), place, source)
     try:
         if not listed:
-            return Material(**table)
-        return Material.from_table(wavelength=table.pop("wavelength_um"), **table)
+            material = Material(**table)
+        else:
+            material = Material.from_table(wavelength=table.pop("wavelength_um"), **table)
     except (TypeError, ValueError) as error:
         raise refused(table, place, source, error) from error
+    if "kappa" not in table and callable(material.n):
+        warn_if_absorbing(f"{source.name} [{place}]", material.n)
+    return material
 
 
 def _material_of_file(table: Mapping[str, Any], place: str, source: Path) -> Material:
     """Read a material from a file of optical constants, named from the scene's folder."""
-    beside = set(table) - {"file", "diffuse_albedo", "name"}
+    beside = set(table) - {"file", "ignore", "kappa", "diffuse_albedo", "name"}
     if beside:
         problem = f"[{place}]: 'file' stands beside {', '.join(sorted(beside))}"
-        cure = "The file has the constants; only diffuse_albedo and name may be added."
+        cure = (
+            "The file has the constants; only kappa where it has none, diffuse_albedo, "
+            "name and ignore may be added."
+        )
         raise DataFileError(source, problem, cure)
-    material = read(_constants_file(table["file"], f"[{place}]", source))
+    file = _constants_file(table["file"], f"[{place}]", source)
+    kappa = table.get("kappa")
+    if not isinstance(kappa, int | float | None) or isinstance(kappa, bool):
+        problem = f"[{place}]: kappa beside 'file' must be a number, got {kappa!r}"
+        raise DataFileError(source, problem, "Or name the file of n: n = { file = ... }.")
+    try:
+        ignored = _ignored(table, f"[{place}]", source)
+        material = read(file, ignore=ignored, kappa=kappa)
+    except DataFileError:
+        raise
+    except ValueError as error:
+        raise refused(table, place, source, error) from error
     if "diffuse_albedo" in table and callable(material.diffuse_albedo):
         problem = f"[{place}]: diffuse_albedo stands beside a file that has it"
         raise DataFileError(source, problem, "Leave out one.")
@@ -235,6 +265,15 @@ def _material_of_file(table: Mapping[str, Any], place: str, source: Path) -> Mat
         if key in table
     }
     return replace(material, **given)
+
+
+def _ignored(table: Mapping[str, Any], place: str, source: Path) -> list[str]:
+    """Return the columns of a file to leave out."""
+    names = table.get("ignore", [])
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        problem = f"{place}: 'ignore' must be a list of names, got {names!r}"
+        raise DataFileError(source, problem, "Write ignore = ['T'].")
+    return names
 
 
 def _constants_file(name: Any, place: str, source: Path) -> str | Path:

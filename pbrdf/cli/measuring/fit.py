@@ -52,8 +52,9 @@ def command(
     reach: Annotated[
         float, typer.Option(min=1.01, max=10.0, help="How far both may go, as a factor.")
     ] = 2.0,
-    kappa: options.Kappa = 0.0,
+    kappa: options.Kappa = None,
     material_file: options.MaterialFile = None,
+    material_ignore: options.MaterialIgnore = "",
     scene: Annotated[
         Path | None,
         typer.Option(
@@ -125,7 +126,9 @@ def command(
         model: MicrofacetModel | SimulatedModel | WaveSurface
         heights = height_rms, corr_length, reach
         if scene is None:
-            material = read_material(n, kappa, material_file)
+            material = read_material(
+                n, kappa, material_file, options.names(material_ignore)
+            )
             model = _closed_form(material, slope_rms, shadowing, heights)
         else:
             alone = (n, slope_rms, material_file, height_rms, corr_length)

@@ -22,8 +22,9 @@ def command(
     surface: options.Surface,
     scan: options.Scan,
     n: options.OptionalIndex = None,
-    kappa: options.Kappa = 0.0,
+    kappa: options.Kappa = None,
     material_file: options.MaterialFile = None,
+    material_ignore: options.MaterialIgnore = "",
     output: options.Output = None,
     force: options.Force = False,
     kind: options.KindOption = Kind.auto,
@@ -73,7 +74,9 @@ def command(
     from pbrdf.cli.typed import words_typed
 
     target = output or Path(f"{scan.stem}-model")
-    material = _needed(read_material(n, kappa, material_file))
+    material = _needed(
+        read_material(n, kappa, material_file, options.names(material_ignore))
+    )
     declared = declaring.declarations(
         scan_columns, azimuth_of_forward, angles, quantity, normalised,
         source_half_angle=source_half_angle, detector_half_angle=detector_half_angle,
@@ -112,7 +115,7 @@ def command(
         if quick:
             told = _first_looks(heights, measurement, common, stage, record, surface)
         else:
-            index = material_file or f"{n:g} + {kappa:g} i"
+            index = material_file or f"{n:g} + {kappa or 0.0:g} i"
             inputs = {
                 "surface": surface.name, "scan": scan.name, "index": index, "fitted": free
             }  # fmt: skip

@@ -30,8 +30,9 @@ def command(
         Path, typer.Argument(help="Height map of the coating.", show_default=False)
     ],
     n: options.OptionalIndex = None,
-    kappa: options.Kappa = 0.0,
+    kappa: options.Kappa = None,
     material_file: options.MaterialFile = None,
+    material_ignore: options.MaterialIgnore = "",
     scan: Annotated[
         Path | None,
         typer.Option(help="Goniometer file to compare with afterwards."),
@@ -87,7 +88,7 @@ def command(
     from pbrdf.cli.reading import read_material, read_scan, read_surface
     from pbrdf.cli.staging import staged_file
 
-    material = read_material(n, kappa, material_file)
+    material = read_material(n, kappa, material_file, options.names(material_ignore))
     if material is None:
         msg = "--n must be given, got none. Or give a --material-file."
         raise ValueError(msg)

