@@ -59,13 +59,28 @@ class MeanField:
 
         exp(-g) (r (1 + g) + second), which stays finite where r vanishes; for p on a
         perfect conductor, where it does not, the exponential of the second order. Each is
-        the better of the two on rigorous profiles.
+        the better of the two on rigorous profiles. What departs from exp(-g) r is damped
+        where it is no small change, and the whole does not exceed a flat surface by it.
         """
         g = self.exponent
-        amplitudes = np.exp(-g) * (self.flat * (1.0 + g) + self.second)
+        change = self.departure
+        damped = change / np.sqrt(1.0 + np.abs(change) ** 4)
+        amplitudes = np.exp(-g) * (self.flat + damped)
         if self.perfect:
             amplitudes[1] = self.flat[1] * np.exp(self.second[1] / self.flat[1])
-        return amplitudes
+        size = np.abs(amplitudes)
+        most = np.maximum(np.abs(self.flat), np.exp(-g) * np.abs(damped))
+        return amplitudes * np.minimum(1.0, most / np.maximum(size, 1e-300))
+
+    @property
+    def departure(self) -> Array:
+        """Second order less that of the Kirchhoff factor, of s and p."""
+        return self.second + self.exponent * self.flat
+
+    @property
+    def doubt(self) -> float:
+        """Largest amplitude by which the beam departs from the Kirchhoff factor."""
+        return float(np.exp(-self.exponent) * np.abs(self.departure).max())
 
     @property
     def jones(self) -> Array:

@@ -25,6 +25,11 @@ __all__ = ["WaveModel"]
 
 Array = np.ndarray
 
+# Zenith beyond which both ways of the light are averaged [rad], and the signs of the Stokes
+# parameters when source and detector change places
+NEAR_GRAZING = 0.5 * np.pi - 2e-3
+EXCHANGE = np.array([1.0, 1.0, -1.0, 1.0])
+
 
 @dataclass(frozen=True, eq=False, init=False)
 class WaveModel:
@@ -204,7 +209,25 @@ class WaveModel:
         """
         shape, columns, azimuth = self._columns(theta_i, theta_s, dphi, wavelength, phi_i)
         found = self.surface.matrices(columns, phi_i=azimuth)
+        low = np.flatnonzero(np.maximum(columns[0], columns[1]) > NEAR_GRAZING)
+        if low.size:
+            found[low] = self._reciprocal(
+                found[low],
+                [c[low] for c in columns],
+                np.broadcast_to(azimuth, len(found))[low],
+            )
         return found.reshape(*shape, 4, 4)
+
+    def _reciprocal(self, there: Array, columns: list[Array], phi_i: Array) -> Array:
+        """Mean of both ways of light that leaves or comes along the surface.
+
+        On the last degree to the horizon few digits are left in the normal parts of waves;
+        what is lost must not tell source from detector.
+        """
+        theta_i, theta_s, dphi, *light = columns
+        back = self.surface.matrices([theta_s, theta_i, -dphi, *light], phi_i=phi_i + dphi)
+        exchanged = back.reshape(-1, 4, 4).swapaxes(1, 2) * np.outer(EXCHANGE, EXCHANGE)
+        return 0.5 * (there + exchanged.reshape(-1, 16))
 
     def coherent(
         self,

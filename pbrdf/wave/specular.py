@@ -1,9 +1,11 @@
 """Mean field of given heights: the specular beam, and what it does to phases."""
 
+import warnings
 from functools import lru_cache
 
 import numpy as np
 
+from pbrdf.errors import AccuracyWarning
 from pbrdf.kernels.wave import orders
 from pbrdf.optics.fresnel import fresnel_amplitudes
 from pbrdf.wave.coherent import MeanField, Medium, Waves, mean_field
@@ -18,8 +20,11 @@ Array = np.ndarray
 PHASE_ZENITHS = np.r_[np.linspace(0.0, 0.5 * np.pi, 19)[:-1], np.deg2rad(89.5)]
 # Heights that are told by height and length alone
 LAWS = {orders.GAUSSIAN: Gaussian, orders.EXPONENTIAL: Exponential}
-# The mean field of grazing incidence proper is that of a mirror
-LARGEST_SINE = 1.0 - 1e-12
+# On the horizon proper some of the waves have no normal part
+LARGEST_SINE = 1.0 - 1e-9
+# Amplitude of second order that is no small change any more; 0.29 at the most in the tables
+# on which the beam is right to 0.02
+DOUBTFUL = 0.5
 
 
 def mean_jones(
@@ -47,12 +52,23 @@ def mean_jones(
     out = np.zeros((*columns[0].shape, 2, 2), dtype=np.complex128)
     if kind == "none":
         return out
+    doubt, where = DOUBTFUL, None
     for at in np.ndindex(columns[0].shape):
         given = [float(c[at]) for c in columns]
         if kind == "kirchhoff":
             out[at] = _kirchhoff(heights, *given[:4])
-        else:
-            out[at] = _second_order(heights, dimensions, *given).jones
+            continue
+        found = _second_order(heights, dimensions, *given)
+        out[at] = found.jones
+        if found.doubt > doubt:
+            doubt, where = found.doubt, given
+    if where is not None:
+        warnings.warn(
+            "The beam is known to second order in the heights, which changes its amplitude "
+            f"by {doubt:.2g} at {np.rad2deg(where[0]):.4g} degrees and {where[1]:g} um: no "
+            "small change. Its reflectance may be off by as much.",
+            AccuracyWarning, stacklevel=4,
+        )  # fmt: skip
     return out
 
 

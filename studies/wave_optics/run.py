@@ -119,6 +119,7 @@ def rough() -> None:
             run = simulate(
                 Scene(surface, Material(1.5)), theta, phi_i="uniform", n_rays=60000,
                 realizations=64, seed=3, max_bounces=1, n_theta=bins, n_dphi=azimuths,
+                variance_reduction=False,
             )  # fmt: skip
             once = run.brdf.sel(bounces="1").isel(theta_i=0).values[..., 0, 0]
             error = run.brdf_stderr.sel(bounces="1").isel(theta_i=0).values[..., 0, 0]

@@ -1,9 +1,11 @@
 """What every wave form owes to physics: reciprocity, mirror symmetry, realisability."""
 
+import warnings
+
 import numpy as np
 import pytest
 
-from pbrdf import Material, WaveModel
+from pbrdf import AccuracyWarning, Material, WaveModel
 from pbrdf.optics import coherency_eigenvalues
 from pbrdf.wave import METHODS
 
@@ -78,6 +80,7 @@ def test_other_surfaces_obey_the_laws(surface) -> None:
         )
 
 
+@pytest.mark.filterwarnings("ignore:The beam is known to second order")
 def test_the_mean_field_is_a_mueller_matrix_of_its_own() -> None:
     theta = np.linspace(0.0, 1.5, 7)
     for material in MATERIALS.values():
@@ -85,3 +88,39 @@ def test_the_mean_field_is_a_mueller_matrix_of_its_own() -> None:
         found = model.coherent(theta, 0.6)
         assert coherency_eigenvalues(found).min() > -1e-15
         assert (found[:, 0, 0] + np.abs(found[:, 0, 1]) <= 1.0).all()
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize("roughness", [(0.003, 0.1), (0.1, 0.9)])
+def test_light_along_the_surface_obeys_the_laws(material, roughness) -> None:
+    """Where waves have almost no normal part, and so few digits."""
+    height, length = roughness
+    model = WaveModel(MATERIALS[material], height_rms=height, corr_length=length)
+    low = np.pi / 2 - np.array([0.0, 1e-9, 1e-6, 1e-4])
+    theta_i, theta_s = (a.ravel() for a in np.meshgrid(low, np.r_[low, 0.0, 0.7]))
+    dphi = np.resize([2.9, 0.8, np.pi, 0.0, 5.0], theta_i.size)
+    found = model.brdf(theta_i, theta_s, dphi, 0.6)
+    back = model.brdf(theta_s, theta_i, -dphi, 0.6)
+    scale = np.maximum(found[:, :1, :1], 1e-250)
+    p = np.diag([1.0, 1.0, -1.0, 1.0])
+    assert (np.abs(back - p @ found.swapaxes(1, 2) @ p) / scale).max() < 1e-12
+    assert coherency_eigenvalues(found / scale).min() > -1e-13
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+def test_the_beam_is_no_brighter_than_light(material) -> None:
+    """Far beyond second order, too; it said up to 76 times the light."""
+    theta = np.r_[0.0, 0.8, 1.3, 1.5, np.pi / 2 - np.array([1e-3, 1e-7, 0.0])]
+    for height, length, form in ((0.1, 0.15, "gaussian"), (3.0, 3.0, "exponential")):
+        model = WaveModel(
+            MATERIALS[material], height_rms=height, corr_length=length, autocorrelation=form
+        )
+        for wavelength in (0.5, 20.0):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", AccuracyWarning)
+                found = model.coherent(theta, wavelength)
+            assert np.isfinite(found).all()
+            assert (found[:, 0, 0] + np.abs(found[:, 0, 1]) <= 1.0 + 1e-12).all()
+    if material == "metal":
+        with pytest.warns(AccuracyWarning, match="no small change"):
+            model.coherent(1.3, 20.0)
