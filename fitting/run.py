@@ -125,6 +125,7 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
     from fitting.problem.assembly import Question, assemble, labelled
     from fitting.problem.refinement import solve_through_cones
     from fitting.result.make_result import result_of
+    from fitting.result.other_side import beside_the_other_side, turned_to_the_other_side
 
     check_seed(seed)
     question = Question(
@@ -139,9 +140,19 @@ def fit(  # noqa: PLR0913  (each is a choice that the person who fits has to mak
         aperture=aperture,
         seed=seed,
     )
-    problems, uncertain = assemble(
-        measurement, model, question, use=use, mask=mask, noise=noise
-    )
-    findings = refuse_errors(labelled(measurement), accept)
+    masks = mask if callable(mask) else tuple(mask)
+    given: dict[str, Any] = {"use": use, "mask": masks, "noise": noise}
+    problems, uncertain = assemble(measurement, model, question, **given)
+    scans = labelled(measurement)
+    findings = refuse_errors(scans, accept)
     result = result_of(*solve_through_cones(problems), uncertain)
+    turned = turned_to_the_other_side(scans)
+    if turned is not None and not {"exchanged", "all"} & set(accept):
+        result = beside_the_other_side(
+            result,
+            lambda: result_of(
+                *solve_through_cones(assemble(turned, model, question, **given)[0]),
+                uncertain,
+            ),
+        )
     return replace(result, warnings=(*result.warnings, *remarks(findings)))

@@ -15,6 +15,8 @@ _OBLIQUE = np.radians(8.0)
 # the mirror image of the specular direction lies
 _BRIGHTER, _FAINTLY, _NEAR = 1.3, 1.02, np.radians(25.0)
 _SAME = np.radians(0.25)
+# Rise over both ends of one side that makes a lobe
+_LOBE = 3.0
 # Readings to interpolate between
 _APART = np.radians(6.0)
 # Departure from reciprocity beyond which it is not noise or an aperture. [1]
@@ -31,6 +33,8 @@ def check_exchange(curves: Sequence[Curve]) -> list[Finding]:
     for curve in curves:
         ratio, where = _brighter_back(curve)
         if np.isnan(ratio):
+            ratio, where = _lobe_back(curve)
+        if np.isnan(ratio):
             continue
         seen += 1
         if ratio > _BRIGHTER and abs(where - curve.theta_i) < _NEAR:
@@ -44,7 +48,8 @@ def check_exchange(curves: Sequence[Curve]) -> list[Finding]:
     if back and 2 * len(back + faint) > seen:
         ratio, curve = max(back, key=lambda pair: pair[0])
         what = (
-            f"the source's side is up to {ratio:.3g} times brighter than the forward side, "
+            f"the source's side is up to {ratio:.3g} times brighter than "
+            f"{'the forward side' if _has_both(curve) else 'at its ends'}, "
             f"with its peak where the specular one should be ({curve.place})"
         )
         suspects = "forward and backward exchanged, or a retro-reflector"
@@ -99,6 +104,32 @@ def _brighter_back(curve: Curve) -> tuple[float, float]:
     if back[peak] - 5.0 * error[peak] <= ahead:
         return 1.0, float("nan")
     return float(back[peak] / ahead), float(zenith[inside][peak])
+
+
+def _has_both(curve: Curve) -> bool:
+    view = curve.in_plane()[0]
+    return bool((view > 0).any() and (view < 0).any())
+
+
+def _lobe_back(curve: Curve) -> tuple[float, float]:
+    """Return the rise of a lobe over both ends of a scan of the source's side, its zenith.
+
+    NaN where the forward side was read, or there is no lobe: light that goes back falls or
+    rises all the way to grazing angles.
+    """
+    view, value, stderr = curve.in_plane()
+    if curve.theta_i < _OBLIQUE or view.size < 7 or (view > _SAME).any():
+        return float("nan"), float("nan")
+    k = int(np.argmax(value))
+    # Facets of a rough metal make a hump there too
+    if not 2 <= k < view.size - 2:
+        return float("nan"), float("nan")
+    ends = max(float(value[:2].max()), float(value[-2:].max()), 1e-3 * float(value[k]))
+    error = float(np.nan_to_num(stderr[k]))
+    if value[k] - 5.0 * error <= ends:
+        return float("nan"), float("nan")
+    ratio = float(value[k]) / ends
+    return (ratio, float(-view[k])) if ratio > _LOBE else (float("nan"), float("nan"))
 
 
 def check_reciprocity(curves: Sequence[Curve]) -> list[Finding]:

@@ -222,7 +222,8 @@ class Problem:
             brightness[lit] = np.clip(brightness[lit], 0.5 * read[lit], 2.0 * read[lit])
         shape = self.weights.shape(brightness)
         # A reading where the model is dark still has some noise
-        shape = np.maximum(shape, 1e-6 * np.median(shape))
+        least = max(1e-6 * np.median(shape), 1e-15 * shape.max(), 1e-200)
+        shape = np.maximum(shape, least)
         if self.replicas:
             # What is estimated from the misfit holds the error of the simulation already
             error = np.linalg.norm(self.simulation_error(solution.x), axis=0)

@@ -1,7 +1,7 @@
 """What a fit found, how well, and what it could not find."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -77,6 +77,8 @@ class FitResult:
         known to be what `values` says. They are those of `ratios`.
     problem : Problem
         What was solved, to be solved again with changes.
+    fits_the_other_side : bool
+        The scans fit far better with forward and backward exchanged: the fit is poor.
     """
 
     values: Mapping[str, float]
@@ -99,13 +101,14 @@ class FitResult:
     stderr_parts: Mapping[str, Mapping[str, float]]
     anchored_stderr: Mapping[str, float]
     problem: "Problem" = field(repr=False)
+    fits_the_other_side: bool = False
 
     @cached_property
     def misfit(self) -> Misfit:
         """How far the readings lie from the curve, in all and by scan and wavelength."""
         x = np.array(list(self.values.values()))
         stated = self.n_estimated == 0
-        return misfit_of(
+        found = misfit_of(
             self.readings,
             self.problem.m00().function(x).full().ravel(),
             share=max(self.dof, 1) / len(self.residuals),
@@ -113,6 +116,7 @@ class FitResult:
             hides=stated or self.noise.endswith("absolute"),
             converged=self.converged,
         )
+        return replace(found, verdict="poor") if self.fits_the_other_side else found
 
     @cached_property
     def held(self) -> dict[str, Any]:

@@ -34,7 +34,7 @@ RULE = (
     "of the readings lie within 5 % of the curve, 19 in 20 and the brightest within 25 % "
     "(1 % and 5 % where neighbours deviate together); fair: half within 20 %, 19 in 20 "
     "and the brightest within a factor of 2, and within 3 of the errors given rms; "
-    "poor: else"
+    "poor: else, or where scans of one side fit far better on the other"
 )
 _HIDDEN = 3.0
 # Scans and wavelengths that a summary lists
@@ -43,6 +43,8 @@ _COLUMNS = (
     "observable", "scan", "wavelength", "theta_i", "theta_s", "dphi", "measured", "model",
     "stderr",
 )  # fmt: skip
+# Where the model is darker than anything, and a deviation whose factor is still a number
+_DARKEST, _MOST = 1e-200, 500.0
 # Observables that cannot be negative, whose deviation is a factor
 _INTENSITIES = ("M00", "I_s", "I_p", "f_ss", "f_sp", "f_ps", "f_pp")
 
@@ -288,11 +290,11 @@ def _deviations(columns: dict[str, np.ndarray], m00: np.ndarray) -> np.ndarray:
     """Return the deviation of each reading, shape (m,)."""
     measured, model, name = (columns[key] for key in ("measured", "model", "observable"))
     is_element = np.isin(name, list(LINEAR))
-    unit = np.where(is_element, np.maximum(np.abs(m00), 1e-300), 1.0)
+    unit = np.where(is_element, np.maximum(np.abs(m00), _DARKEST), 1.0)
     deviation = (measured - model) / unit
     factor = np.isin(name, _INTENSITIES) & (measured > 0.0) & (model > 0.0)
-    deviation[factor] = np.log(measured[factor] / model[factor])
-    return np.asarray(deviation)
+    deviation[factor] = np.log(measured[factor]) - np.log(model[factor])
+    return np.asarray(np.clip(deviation, -_MOST, _MOST))
 
 
 def _members(scan: np.ndarray, waves: np.ndarray) -> Iterator[np.ndarray]:
