@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fitting.prediction.facets import Facets
-from pbrdf import MicrofacetModel
+from pbrdf import MicrofacetModel, WaveModel
 from pbrdf.analytic.bounces import second_bounce
 
 Array = np.ndarray
@@ -24,15 +24,15 @@ class Draw:
 
     Parameters
     ----------
-    model : MicrofacetModel
-        Over its own slopes and index.
+    model : MicrofacetModel or WaveModel
+        Over its own slopes or heights, and index.
     gain : ndarray, shape (k,)
         Factors of the facet model's own error. [1]
     base : ndarray, shape (k,)
         Lambertian albedo of what the map does not show. [1]
     """
 
-    model: MicrofacetModel
+    model: MicrofacetModel | WaveModel
     gain: Array
     base: Array
 
@@ -43,8 +43,8 @@ class Prediction:
 
     Parameters
     ----------
-    model : MicrofacetModel
-        Facets at the most likely value of everything.
+    model : MicrofacetModel or WaveModel
+        Facets, or waves of a smooth map, at the most likely value of everything.
     wavelength : float
         In vacuum. [um]
     facets : Facets
@@ -55,7 +55,7 @@ class Prediction:
         What was assumed, in words.
     """
 
-    model: MicrofacetModel
+    model: MicrofacetModel | WaveModel
     wavelength: float
     facets: Facets
     draws: tuple[Draw, ...]
@@ -66,6 +66,8 @@ class Prediction:
         wavelength: float | None = None, *, phi_i: npt.ArrayLike = 0.0,
     ) -> Array:  # fmt: skip
         """Mueller BRDF of one and two bounces; arguments broadcast.
+
+        Of a smooth map the incoherent part of one; its specular beam is `coherent`.
 
         Parameters
         ----------
@@ -110,8 +112,16 @@ class Prediction:
         low, high = np.quantile(np.concatenate(values, axis=-1), ends, axis=-1)
         return low, high
 
+    def coherent(self, theta_i: npt.ArrayLike) -> Array:
+        """Mueller matrix of the specular beam, (..., 4, 4) [1]; 0 of a map of facets."""
+        if isinstance(self.model, WaveModel):
+            return self.model.coherent(theta_i, self.wavelength)
+        return np.zeros((*np.shape(theta_i), 4, 4))
+
     def _twice(self, angles: tuple[npt.ArrayLike, ...], phi_i: npt.ArrayLike) -> Array:
         theta_i, theta_s, dphi = angles
+        if isinstance(self.model, WaveModel):
+            return np.zeros((*np.broadcast_shapes(*map(np.shape, (*angles, phi_i))), 4, 4))
         return second_bounce(
             self._gaussian, theta_i, theta_s, dphi, self.wavelength,
             phi_i=phi_i, nodes=_NODES,

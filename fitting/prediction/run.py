@@ -12,6 +12,7 @@ from fitting.prediction.facets import Facets, facets_of
 from fitting.prediction.instrument import Instrument, widest_spread
 from fitting.prediction.prediction import Draw, Prediction
 from fitting.prediction.steep import bridged
+from fitting.prediction.waves import density_of, is_smooth, smooth_notes, wave_model
 from fitting.statistics.mended import mended_once
 from pbrdf import HeightMap, Material, MicrofacetModel
 from pbrdf.errors import one_number
@@ -51,6 +52,7 @@ def predict(  # noqa: PLR0913  (the public signature)
     place: float = _PLACE,
     base_albedo: float | None = None,
     seed: int = 0,
+    wave: bool | None = None,
 ) -> Prediction:
     """Predict the Mueller BRDF of a surface from its height map; nothing is fitted.
 
@@ -85,6 +87,9 @@ def predict(  # noqa: PLR0913  (the public signature)
         material states no base, as of black paint, else 0.
     seed : int
         Of the draws.
+    wave : bool, optional
+        Whether waves scatter at the spectral density of the map, or facets mirror; by
+        default waves where 1 % or more of the specular beam remains at normal incidence.
 
     Returns
     -------
@@ -132,6 +137,12 @@ def predict(  # noqa: PLR0913  (the public signature)
         resolution = instrument.spread(max(surface.spacing))
     facets = facets_of(mended, wavelength, resolution=resolution, lost=lost)
     own = place_error(mended)
+    if is_smooth(mended, wavelength) if wave is None else wave:
+        return _by_waves(
+            mended, optics, facets, seed, wavelength=float(wavelength),
+            resolution=resolution, place=max(place, own), index_stderr=index_stderr,
+            base_albedo=base_albedo,
+        )  # fmt: skip
     # A periodic map was made, and seen by no instrument
     unknown = resolution == 0 and not surface.periodic
     blurred = widest_spread(max(surface.spacing)) if unknown else resolution
@@ -158,6 +169,39 @@ def predict(  # noqa: PLR0913  (the public signature)
     return Prediction(
         model=_model(facets, optics), wavelength=float(wavelength), facets=facets,
         draws=draws, notes=tuple(notes),
+    )  # fmt: skip
+
+
+def _by_waves(
+    surface: HeightMap, optics: Material, facets: Facets, seed: int, **known: float
+) -> Prediction:
+    """Predict a smooth map: waves at its spectral density."""
+    wavelength, resolution = known["wavelength"], known["resolution"]
+    place, index_stderr = known["place"], known["index_stderr"]
+    base_albedo = known["base_albedo"]
+    density = density_of(surface, resolution)
+    model = wave_model(density, optics)
+    notes = [*smooth_notes(surface, model, wavelength, resolution)]
+    for text in notes[1:]:
+        warnings.warn(text, UserWarning, stacklevel=3)
+    notes.append(
+        f"the interval holds: heights {place:.0%} between places, n +- {index_stderr:g}, "
+        f"model {_MODEL:.0%}, Lambertian base 0 to {base_albedo:g}"
+    )
+    rng = np.random.default_rng(seed)
+    draws = tuple(
+        Draw(
+            model=wave_model(
+                density, _shifted(optics, float(index_stderr * rng.standard_normal())),
+                scale=float(np.exp(place * rng.standard_normal())),
+            ),
+            gain=np.exp(_MODEL * rng.standard_normal(_WITHIN)),
+            base=base_albedo * rng.random(_WITHIN),
+        )
+        for _ in range(_DRAWS)
+    )  # fmt: skip
+    return Prediction(
+        model=model, wavelength=wavelength, facets=facets, draws=draws, notes=tuple(notes),
     )  # fmt: skip
 
 

@@ -20,6 +20,8 @@ POWERS = (-2, -1, 0, 1, 2)
 LARGE = 32.0
 ASYMPTOTIC_TERMS = 24
 SERIES_TERMS = 130
+# Part of the largest term below which the rest of a sum is rounding
+NO_MORE = 1e-18
 # Smallest share of a peak that is kept: what lies below is rounding of the transform
 FLOOR = 1e-13
 RISES, WAVES = 64, 220
@@ -37,7 +39,13 @@ def scaled_sums(x: Array, g: float) -> list[Array]:
     few = np.clip(x, -LARGE, LARGE)
     sums = [np.zeros_like(x) for _ in POWERS]
     term = few * np.exp(-g)
+    largest = float(np.abs(few).max(initial=0.0))
+    size, most = 1.0, 0.0
     for n in range(2, SERIES_TERMS):
+        size *= largest / n
+        most = max(most, size)
+        if size < NO_MORE * most:
+            break
         term = term * few / n
         for total, power in zip(sums, POWERS, strict=True):
             total += term / float(n) ** power

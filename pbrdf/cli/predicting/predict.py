@@ -124,7 +124,7 @@ def command(
         if measured is None
         else chain(_compared(predicted, measured), _free_slopes(found, measured))
     )
-    for line in lines:
+    for line in chain(lines, _beams(found, geometry)):
         typer.echo(line)
     if output is not None:
         typer.echo(f"Result: {output}")
@@ -195,6 +195,19 @@ def _readings(found: "Prediction", geometry: "xr.Dataset") -> "xr.Dataset":
     }
     coords["wavelength"] = ("geometry", np.full(low.size, found.wavelength))
     return xr.Dataset(data, coords=coords)
+
+
+def _beams(found: "Prediction", geometry: "xr.Dataset") -> Iterator[str]:
+    """Yield the specular beams of a smooth map, which are no BRDF."""
+    import numpy as np
+
+    for theta in np.unique(geometry.theta_i.values):
+        beam = found.coherent(theta)[0, 0]
+        if beam > 0:
+            yield (
+                f"incidence {np.rad2deg(theta):.3g} deg: reflectance of the specular beam "
+                f"{beam:.3g}, not in M00"
+            )
 
 
 def _brightest(predicted: "xr.Dataset") -> Iterator[str]:
