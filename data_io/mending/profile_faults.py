@@ -4,14 +4,14 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from data_io.mending.faults import Mend, wanted_kinds, warn_of
+from data_io.mending.faults import Mend, wanted_kinds
 from data_io.mending.sentinels import find_sentinels, find_spikes_along
 
 Array = np.ndarray
 
 
 def find_profile_faults(
-    x: Array, values: Array, *, kinds: str | Iterable[str], name: str
+    x: Array, values: Array, *, kinds: str | Iterable[str]
 ) -> tuple[Mend, ...]:
     """Find the faults of a profile, and say what they are.
 
@@ -22,18 +22,11 @@ def find_profile_faults(
     kinds : str or sequence of str
         What is to be left out, as in `data_io.mend_map`; a profile has sentinels and
         spikes.
-    name : str
-        Of the profile, for the warning.
 
     Returns
     -------
     tuple of Mend
         `mended` where points are to be left out.
-
-    Warns
-    -----
-    MendWarning
-        For each kind that was found.
     """
     wanted = wanted_kinds(kinds)
     clean = np.asarray(values, dtype=float)
@@ -52,6 +45,4 @@ def find_profile_faults(
         if count:
             sentence = f"{count} of {clean.size} points {verbs[count > 1]} {text}"
             mends.append(Mend(kind, count, sentence, where, kind in wanted))
-    for one in mends:
-        warn_of(name, one, stacklevel=5)
     return tuple(mends)

@@ -7,13 +7,8 @@ import numpy as np
 
 from data_io.text.text import Line, Rows, find_delimiter, read_numbers, split_header
 from data_io.text.units import axis_units, sole_unit, unit_factor, warn_missing_unit
-from data_io.topography.columns import (
-    Column,
-    Columns,
-    asked_columns,
-    name_columns,
-    table_width,
-)
+from data_io.topography.column_names import Column, name_columns, table_width
+from data_io.topography.columns import Columns, asked_columns
 from data_io.topography.header_fields import matrix_header
 from data_io.topography.plausible import with_spacing
 from pbrdf.errors import DataFileError

@@ -5,14 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
+from data_io.mending.faults import warn_of
 from data_io.mending.profile_faults import find_profile_faults
 from data_io.text.files import TEXT_SUFFIXES, is_text
 from data_io.text.text import split_header
-from data_io.topography.columns import (
-    Columns,
-    name_columns,
-    table_width,
-)
+from data_io.topography.column_names import name_columns, table_width
+from data_io.topography.columns import Columns
 from data_io.topography.formats.instruments import (
     INSTRUMENT_SUFFIXES,
     read_instrument_profile,
@@ -59,13 +57,14 @@ def mend_profile(
     MendWarning
         For each kind that was found.
     """
-    return _mended(profile, kinds, name)
+    mended = _mended(profile, kinds)
+    _warn_of_faults(name, mended)
+    return mended
 
 
-def _mended(profile: Profile, kinds: str | Sequence[str], name: str) -> Profile:
-    """Leave out what is at fault, for the public functions that were called."""
+def _mended(profile: Profile, kinds: str | Sequence[str]) -> Profile:
     values = profile.z if profile.slope is None else profile.slope
-    mends = find_profile_faults(profile.x, values, kinds=kinds, name=name)
+    mends = find_profile_faults(profile.x, values, kinds=kinds)
     if not mends:
         return profile
     kept = ~np.logical_or.reduce([one.where & one.mended for one in mends])
@@ -74,6 +73,12 @@ def _mended(profile: Profile, kinds: str | Sequence[str], name: str) -> Profile:
     else:
         left = Profile.from_slope(profile.x[kept], profile.slope[kept])
     return MendedProfile(left, mends=mends, raw=profile)
+
+
+def _warn_of_faults(name: str, mended: Profile) -> None:
+    """Warn of what was found, where the public function was called."""
+    for one in mended.mends if isinstance(mended, MendedProfile) else ():
+        warn_of(name, one, stacklevel=4)
 
 
 def read_profile(
@@ -145,7 +150,8 @@ def read_profile(
     path = Path(path)
     found = _read_any(path, unit, columns, spacing, block)
     check_profile_scale(path, found.x, found.z)
-    mended = _mended(found, mend, path.name)
+    mended = _mended(found, mend)
+    _warn_of_faults(path.name, mended)
     if mend != "none":
         check_heights(path, mended.z)
     return mended

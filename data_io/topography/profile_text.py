@@ -6,11 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from data_io.text.text import Line, Rows, find_delimiter, read_numbers, split_header
-from data_io.topography.columns import (
-    Columns,
-    column_sizes,
-    profile_columns,
-)
+from data_io.topography.columns import Columns, column_sizes, profile_columns
 from data_io.topography.header_fields import profile_step
 from data_io.topography.profile import Profile
 from pbrdf.errors import DataFileError

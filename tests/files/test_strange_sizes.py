@@ -7,7 +7,7 @@ import pytest
 
 import pbrdf
 from data_io import read_goniometer, read_height_map, read_result, write_result
-from data_io.topography.columns import _split_outside
+from data_io.topography.column_names import _split_outside
 from pbrdf.errors import DataFileError
 from pbrdf.signatures.bands import read_response
 from pbrdf.signatures.skies import read_sky
