@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pbrdf.cli import declaring, options
+from pbrdf.cli import declaring, option_text, options
 from pbrdf.cli.typed import words_typed
 
 if TYPE_CHECKING:
@@ -142,18 +142,18 @@ def command(
                 "n_rays": n_rays, "realizations": realizations, "seed": seed,
                 "workers": workers, "progress": progress,
             }  # fmt: skip
-            names = options.names(free)
+            names = option_text.names(free)
             model = _simulated(scene, measured.values(), names, **traced)
         result = fit_model(
             measured,
             model,
-            free=options.names(free),
+            free=option_text.names(free),
             solver=solver,
             priors=None if slope_stderr is None else _slope(model, slope_stderr),
             separate=_separate(separate),
             mask=(zeros(), blocked_detector(blocked)) if blocked else (zeros(),),
             loss=loss,
-            accept=options.names(accept),
+            accept=option_text.names(accept),
         )
     if output is not None:
         with staged_folder(output, force=force) as stage:
@@ -161,7 +161,7 @@ def command(
             from fitting.report.record import record_of
 
             files = {"scan": scans, "scene": scene, "material": material_file}
-            told, chosen = words_typed(), options.recorded(given)
+            told, chosen = words_typed(), option_text.recorded(given)
             record = record_of(files, command="fit", options=chosen, typed=told)
             write_fit(result, measured, stage, record=record)
     answer(result.summary(), result.as_dict(), as_json, force=force)
@@ -191,7 +191,7 @@ def _separate(text: str) -> dict[str, str]:
     >>> _separate("scale, n=wavelength")
     {'scale': 'scan', 'n': 'wavelength'}
     """
-    pairs = (word.partition("=") for word in options.names(text))
+    pairs = (word.partition("=") for word in option_text.names(text))
     return {name.strip(): by.strip() or "scan" for name, _, by in pairs}
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pbrdf.cli import declaring, options
+from pbrdf.cli import declaring, option_text, options
 from pbrdf.cli.options import Kind
 
 if TYPE_CHECKING:
@@ -99,17 +99,17 @@ def command(
         bars = stack.enter_context(StageBars())
         common: dict[str, Any] = {
             "material": material,
-            "free": options.names(free),
+            "free": option_text.names(free),
             "shadowing": shadowing,
-            "form": options.form(form),
+            "form": option_text.form(form),
             "mask": (zeros(), blocked_detector(blocked)) if blocked else (zeros(),),
-            "accept": options.names(accept),
+            "accept": option_text.names(accept),
             "progress": bars.update,
         }
         record = record_of(
             {"surface": surface, "scan": scan, "material": material_file},
             command="pipeline",
-            options=options.recorded(given),
+            options=option_text.recorded(given),
             typed=words_typed(),
         )
         if quick:

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from pbrdf.cli import options
+from pbrdf.cli import option_text, options
 from pbrdf.cli.options import Kind
 
 
@@ -103,7 +103,7 @@ def command(
 
     from fitting import surface_statistics
 
-    found = surface_statistics(heights, form=options.form(form))
+    found = surface_statistics(heights, form=option_text.form(form))
     answer(str(found), found.to_dict(), as_json, force=force)
     if figure is not None:
         from fitting.report.surface import surface_figure

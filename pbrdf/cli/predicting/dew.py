@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pbrdf.cli import options
+from pbrdf.cli import option_text, options
 from pbrdf.cli.typed import words_typed
 
 if TYPE_CHECKING:
@@ -114,10 +114,10 @@ def command(
         substrate = pbrdf.Material(n, diffuse_albedo=diffuse_albedo)
     else:
         surface, substrate = _clean(scene)
-    angles = options.angles(contact_angles, "--contact-angles-deg", below=180.0)
-    incidences = options.incidences(theta_i)
+    angles = option_text.angles(contact_angles, "--contact-angles-deg", below=180.0)
+    incidences = option_text.incidences(theta_i)
     target = output or Path("dew")
-    waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
+    waves = option_text.wavelengths(wavelength)
     liquid = pbrdf.materials.get("water")
     if waves is None or water_n is not None:
         liquid = pbrdf.Material(water_n or 1.333, name="water")
@@ -139,7 +139,7 @@ def command(
                 )  # fmt: skip
                 results.append(one)
         whole = _joined(results)
-        chosen = options.recorded(given)
+        chosen = option_text.recorded(given)
         whole.attrs["made_by"] = record_of(
             {"scene": scene}, command="dew", options=chosen, typed=words_typed()
         )

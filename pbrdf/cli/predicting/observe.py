@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pbrdf.cli import declaring, options
+from pbrdf.cli import declaring, option_text, options
 from pbrdf.cli.options import Stokes
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def command(
 
     loaded = pbrdf.load_scene(scene)
     target_file = output or scene.with_name(f"{scene.stem}-scan.csv")
-    waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
+    waves = option_text.wavelengths(wavelength)
     if waves is not None and len(waves) > 1 and target_file.suffix not in (".nc", ".zarr"):
         msg = (
             f"--wavelength-um must be one number for a scan, got {len(waves)}. "
@@ -168,15 +168,15 @@ def _plane(theta_i: str, theta_view: str) -> "tuple[np.ndarray, np.ndarray, np.n
     """Return every view angle at every incidence. [rad]"""
     import numpy as np
 
-    incidences = np.deg2rad(options.numbers(theta_i, "--theta-i-deg"))
-    views = np.deg2rad(options.numbers(theta_view, "--theta-view-deg"))
+    incidences = np.deg2rad(option_text.numbers(theta_i, "--theta-i-deg"))
+    views = np.deg2rad(option_text.numbers(theta_view, "--theta-view-deg"))
     source, view = (mesh.ravel() for mesh in np.meshgrid(incidences, views, indexing="ij"))
     return source, np.abs(view), np.where(view >= 0.0, np.pi, 0.0)
 
 
 def _one_azimuth(text: str) -> str | float:
     """Return "uniform" or the one azimuth. [rad]"""
-    azimuth = options.azimuths(text)
+    azimuth = option_text.azimuths(text)
     if isinstance(azimuth, list):
         msg = (
             f"--phi-i-deg must be one number or uniform here, got {len(azimuth)}. "

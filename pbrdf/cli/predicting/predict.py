@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pbrdf.cli import declaring, options
+from pbrdf.cli import declaring, option_text, options
 
 if TYPE_CHECKING:
     import numpy as np
@@ -110,7 +110,7 @@ def command(
         heights, material, wavelength=wave, resolution=resolution, seed=seed,
         instrument=_instrument(aperture, instrument_wavelength, pixel),
     )  # fmt: skip
-    geometry = _plane(options.incidences(theta_i)) if measured is None else measured
+    geometry = _plane(option_text.incidences(theta_i)) if measured is None else measured
     predicted = _readings(found, geometry)
     if output is not None:
         from data_io import write_goniometer

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pbrdf.cli import options
+from pbrdf.cli import option_text, options
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -121,9 +121,9 @@ def command(
     from pbrdf.cli.staging import staged_file
     from pbrdf.signatures import in_band, read_response
 
-    waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
-    views = options.angles(view_zenith, "--view-zenith-deg", below=90.0)
-    azimuths = np.deg2rad(options.numbers(view_azimuth, "--view-azimuth-deg"))
+    waves = option_text.wavelengths(wavelength)
+    views = option_text.angles(view_zenith, "--view-zenith-deg", below=90.0)
+    azimuths = np.deg2rad(option_text.numbers(view_azimuth, "--view-azimuth-deg"))
     if time is not None or latitude is not None or longitude is not None:
         sun_zenith, sun_azimuth = _sun_at(time, latitude, longitude, sun_zenith)
     response = None if band is None else read_response(band)

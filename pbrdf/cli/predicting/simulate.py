@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pbrdf.cli import options
+from pbrdf.cli import option_text, options
 from pbrdf.cli.options import Stokes
 
 if TYPE_CHECKING:
@@ -64,17 +64,17 @@ def command(
     from pbrdf.simulation import simulate_parts
 
     loaded = pbrdf.load_scene(scene)
-    target_file = options.result_file(output or scene.with_suffix(".nc"))
+    target_file = option_text.result_file(output or scene.with_suffix(".nc"))
     if target is None or n_rays is not None or realizations is not None:
         n_rays, realizations = n_rays or 100_000, realizations or 16
-    waves = None if wavelength is None else options.numbers(wavelength, "--wavelength-um")
-    directions, azimuths = options.incidences(theta_i), options.azimuths(phi_i)
+    waves = option_text.wavelengths(wavelength)
+    directions, azimuths = option_text.incidences(theta_i), option_text.azimuths(phi_i)
     size: dict[str, Any] = {
         "phi_i": azimuths, "wavelength": waves, "n_theta": n_theta, "n_dphi": n_dphi,
         "stokes": stokes.value,
     }  # fmt: skip
     record = record_of(
-        {"scene": scene}, command="simulate", options=options.recorded(given),
+        {"scene": scene}, command="simulate", options=option_text.recorded(given),
         typed=words_typed(),
     )  # fmt: skip
     store = target_file.suffix == ".zarr"

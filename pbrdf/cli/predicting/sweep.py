@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pbrdf.cli import options
+from pbrdf.cli import option_text, options
 from pbrdf.cli.options import Stokes
 
 if TYPE_CHECKING:
@@ -142,11 +142,11 @@ def _settings(params: dict[str, Any]) -> dict[str, Any]:
     """Return the table [simulate] that the options say."""
     azimuths: Any = params["phi_i"].strip()
     if azimuths != "uniform":
-        listed = options.numbers(azimuths, "--phi-i-deg")
+        listed = option_text.numbers(azimuths, "--phi-i-deg")
         azimuths = listed[0] if len(listed) == 1 else listed
-    options.incidences(params["theta_i"])
+    option_text.incidences(params["theta_i"])
     table = {
-        "theta_i_deg": options.numbers(params["theta_i"], "--theta-i-deg"),
+        "theta_i_deg": option_text.numbers(params["theta_i"], "--theta-i-deg"),
         "phi_i_deg": azimuths,
         "source_half_angle_deg": params["source_half_angle"],
         "target_rel_error": params["target"],
@@ -154,8 +154,7 @@ def _settings(params: dict[str, Any]) -> dict[str, Any]:
     }
     plain = ("fold", "n_rays", "realizations", "max_bounces", "n_theta", "n_dphi", "seed")
     table |= {name: params[name] for name in plain}
-    if params["wavelength"] is not None:
-        table["wavelength_um"] = options.numbers(params["wavelength"], "--wavelength-um")
+    table["wavelength_um"] = option_text.wavelengths(params["wavelength"])
     return {key: value for key, value in table.items() if value is not None}
 
 
@@ -170,7 +169,7 @@ def _one_file(context: typer.Context, sweep: "Sweep", target: Path) -> "Report":
     given = context.params
     workers = given["workers"]
     record = record_of(
-        {"scene": given["source"]}, command="sweep", options=options.recorded(given),
+        {"scene": given["source"]}, command="sweep", options=option_text.recorded(given),
         typed=words_typed(),
     )  # fmt: skip
     with staged_file(target, force=given["force"]) as stage:
@@ -249,7 +248,7 @@ def _part(text: str | None) -> tuple[int, int] | None:
 def _axis(text: str) -> tuple[str, list[Any]]:
     """Return name and values of NAME=VALUE,VALUE,..."""
     name, equals, values = text.partition("=")
-    words = options.names(values)
+    words = option_text.names(values)
     if not equals or not words:
         msg = f"--vary must be NAME=VALUE,VALUE,... got {text!r}."
         raise ValueError(msg)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pbrdf.cli import options
+from pbrdf.cli import option_text, options
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,7 +86,7 @@ def command(
             rows = (
                 as_rows(_result(source, at, wavelength))
                 if model is None
-                else model_rows(model, options.incidences(theta_i), wavelength)
+                else model_rows(model, option_text.incidences(theta_i), wavelength)
             )
             write_table(rows, stage, convention)
         else:

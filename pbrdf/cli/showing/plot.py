@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pbrdf.cli import declaring, options
+from pbrdf.cli import declaring, option_text, options
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -92,7 +92,7 @@ def command(
         if source.suffix == ".nc" or data_io.is_result_store(source):
             result = data_io.read_result(source)
             places = _places(result, theta_i, wavelength, at, one=not plane)
-            names = options.names(elements)
+            names = option_text.names(elements)
             if plane:
                 figure = plane_cuts(
                     result, names, scale=scale.value, width_mm=width_mm, places=places
@@ -104,7 +104,7 @@ def command(
                 )  # fmt: skip
         elif source.suffix == ".zarr":
             figure = _of_store(
-                source, at, theta_i, wavelength, options.names(elements), plane=plane,
+                source, at, theta_i, wavelength, option_text.names(elements), plane=plane,
                 scale=scale.value, width_mm=width_mm,
             )  # fmt: skip
         elif source.suffix == ".toml":
@@ -156,7 +156,7 @@ def _of_store(
 def _place(text: str) -> tuple[str, float]:
     """Return dimension and value of NAME=VALUE; azimuths become radians."""
     name, _, value = text.partition("=")
-    numbers = options.numbers(value, f"--at {name}")
+    numbers = option_text.numbers(value, f"--at {name}")
     if len(numbers) != 1:
         msg = f"--at must be NAME=VALUE, got {text!r}."
         raise ValueError(msg)
