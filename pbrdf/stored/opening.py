@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from pbrdf.stored.contents import open_contents
-from pbrdf.stored.scattered import ScatteredBRDF
 from pbrdf.stored.source import StoredBRDF
 
 __all__ = ["from_store"]
@@ -25,7 +24,4 @@ def from_store(path: str | Path) -> StoredBRDF:
     FileNotFoundError
         If there is none.
     """
-    contents = open_contents(path)
-    if contents.cloud is None:
-        return StoredBRDF(contents)
-    return ScatteredBRDF(contents)
+    return StoredBRDF(open_contents(path))

@@ -1,4 +1,4 @@
-"""The store of a list or a sample of points as a BRDF, by radial basis functions."""
+"""Interpolation of a list or a sample of points, by radial basis functions."""
 
 from functools import cache, cached_property
 from typing import Any
@@ -6,19 +6,19 @@ from typing import Any
 import numpy as np
 
 from pbrdf.stored.contents import Contents, Parameter
+from pbrdf.stored.interpolation import Interpolation
 from pbrdf.stored.left_out import Measured, grouped
 from pbrdf.stored.parameters import Cloud
 from pbrdf.stored.schemes import Scheme, combined
-from pbrdf.stored.source import StoredBRDF
 
-__all__ = ["ScatteredBRDF"]
+__all__ = ["ScatteredInterpolation"]
 
 # Points left out to choose how to interpolate, and about a place to judge the error there
 _TRIED, _JUDGED = 12, 8
 
 
-class ScatteredBRDF(StoredBRDF):
-    """A BRDF between points that are no grid; `pbrdf.from_store` opens it.
+class ScatteredInterpolation(Interpolation):
+    """Interpolation between points that form no grid.
 
     Values are linear combinations of those of the nearest points, in ln M00 and elements
     over M00 or in the elements themselves, by the radial functions that miss points which
@@ -57,8 +57,9 @@ class ScatteredBRDF(StoredBRDF):
         return np.array([place[name] for name in self._cloud.names], dtype=float)
 
     @cached_property
-    def _measured(self) -> dict[str, Measured]:
-        found = super()._measured
+    def measured(self) -> dict[str, Measured]:
+        """How each axis and the points are interpolated, and the error of it."""
+        found = super().measured
         cloud, scheme = self._chosen
         numbers = cloud.nearest(cloud.points.mean(0), _TRIED)
         each = np.array([self._missed(int(k)) for k in numbers])

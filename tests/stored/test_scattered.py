@@ -13,7 +13,7 @@ import pbrdf
 from pbrdf.conventions import STOKES, detector_bins
 from pbrdf.stored.contents import Contents
 from pbrdf.stored.parameters import Cloud, Parameter
-from pbrdf.stored.scattered import ScatteredBRDF
+from pbrdf.stored.source import StoredBRDF
 from pbrdf.sweeps import load_sweep, run_sweep
 from tests.stored.test_stated_error import (
     INCIDENCES,
@@ -70,7 +70,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return swept(tmp_path_factory.mktemp("sobol"))
 
 
-def known(noise: float) -> ScatteredBRDF:
+def known(noise: float) -> StoredBRDF:
     """32 points of a Sobol sequence of the analytical model."""
     shares = qmc.Sobol(2, rng=1).random(32)
     swept = {"slope_rms": 0.12 * 2.5 ** shares[:, 0], "n": 1.4 + 0.3 * shares[:, 1]}
@@ -102,7 +102,7 @@ def known(noise: float) -> ScatteredBRDF:
     }
     cloud = Cloud.of(dataset.state, list(held.values()), [{"scale": "linear"}] * 2)
     path = Path("known.zarr")
-    return ScatteredBRDF(Contents(path=path, dataset=dataset, parameters=held, cloud=cloud))
+    return StoredBRDF(Contents(path=path, dataset=dataset, parameters=held, cloud=cloud))
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])

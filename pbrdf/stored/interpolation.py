@@ -1,0 +1,189 @@
+"""The points of a sweep's store, and what lies between them."""
+
+import warnings
+from collections import OrderedDict
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pbrdf.errors import AccuracyWarning
+from pbrdf.stored.contents import Contents, Parameter
+from pbrdf.stored.left_out import (
+    CLASSES,
+    Measured,
+    along,
+    best,
+    midway,
+    missed,
+    parameter_trial,
+)
+from pbrdf.stored.lobes import Lobes
+from pbrdf.stored.point import Point, incidence_trial
+from pbrdf.stored.schemes import SCHEMES, Scheme, combined
+
+__all__ = ["Interpolation"]
+
+# Points of the parameters that stay in memory
+_KEPT = 8
+# Beyond this miss of a value left out, in parts of M00, errors do not scale to gaps
+COARSE = 0.5
+
+
+class Interpolation:
+    """Interpolation of a store along its parameters, chosen by leaving out nodes.
+
+    Parameters
+    ----------
+    contents : Contents
+        The opened store.
+    """
+
+    def __init__(self, contents: Contents) -> None:
+        self._contents = contents
+        self._theta_i = contents.dataset.theta_i.to_numpy()
+        self._points: OrderedDict[tuple[Any, ...], Point] = OrderedDict()
+
+    def point(self, place: dict[str, Any]) -> Point:
+        """Return the interpolated point, one of those in memory if it is there."""
+        parameters = self._contents.parameters
+        place = {name: parameters[name].check(value) for name, value in place.items()}
+        key = tuple(place.values())
+        if key not in self._points:
+            lobes = self._lobes(*self._reduced(place), self._scheme("theta_i"))
+            self._points[key] = Point(lobes, lambda: self._between_points(place))
+            if len(self._points) > _KEPT:
+                self._points.popitem(last=False)
+        self._points.move_to_end(key)
+        return self._points[key]
+
+    def _lobes(self, value: np.ndarray, stderr: np.ndarray, scheme: Scheme) -> Lobes:
+        data = self._contents.dataset
+        return Lobes(
+            theta_i=self._theta_i, theta_s=data.theta_s.to_numpy(),
+            dphi=data.dphi.to_numpy(), value=value, stderr=stderr, scheme=scheme,
+        )  # fmt: skip
+
+    def _between_points(self, place: dict[str, Any]) -> np.ndarray:
+        """Error of the interpolation along all parameters, by class."""
+        total = np.zeros((len(CLASSES), 4, 4))
+        for name, parameter in self._axes.items():
+            nodes = parameter.nodes
+            if not parameter.number or np.isclose(nodes, place[name], rtol=1e-9).any():
+                continue
+            value, stderr = self._reduced(place, keep=name)
+            if len(nodes) == 2:
+                share = (place[name] - nodes[0]) / (nodes[1] - nodes[0])
+                total = np.hypot(total, midway(value[0], value[1], share))
+            else:
+                scheme = self._scheme(name)
+                found = missed(parameter_trial(scheme, nodes, value, stderr))
+                total = np.hypot(total, along(scheme, nodes, place[name], found))
+        return total
+
+    @property
+    def _axes(self) -> dict[str, Parameter]:
+        """Parameters that are dimensions of the store."""
+        return self._contents.parameters
+
+    def _middle(self) -> dict[str, np.ndarray]:
+        """Return the middle of all axes."""
+        return {n: np.array([(len(p.nodes) - 1) // 2]) for n, p in self._axes.items()}
+
+    def _stencil(
+        self, place: dict[str, Any], keep: str | None
+    ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+        """Return indices and weights of the points about a place, along each axis."""
+        stencil: dict[str, np.ndarray] = {}
+        weights: dict[str, np.ndarray] = {}
+        for name, parameter in self._axes.items():
+            if name == keep:
+                stencil[name] = np.arange(len(parameter.nodes))
+            elif parameter.number and len(parameter.nodes) > 1:
+                index, weight = self._scheme(name).weights(parameter.nodes, place[name])
+                # Points that count for nothing need not be finished
+                stencil[name], weights[name] = index[weight != 0], weight[weight != 0]
+            else:
+                stencil[name] = np.flatnonzero(parameter.nodes == place[name])[:1]
+                weights[name] = np.ones(1)
+        return stencil, weights
+
+    def _reduced(
+        self, place: dict[str, Any], keep: str | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Hemispheres of all incidences at a place; along one parameter all its nodes."""
+        stencil, weights = self._stencil(place, keep)
+        value, stderr = self._contents.read(stencil)
+        for axis, name in reversed(list(enumerate(stencil))):
+            if name == keep:
+                continue
+            # Stokes axes are last, the axis that goes before them
+            value, stderr = combined(
+                weights[name], np.moveaxis(value, axis, -3), np.moveaxis(stderr, axis, -3),
+                log=len(weights[name]) > 1 and self._scheme(name).log,
+            )  # fmt: skip
+        return value, stderr
+
+    def _scheme(self, name: str) -> Scheme:
+        return self.measured[name].scheme if name in self.measured else SCHEMES["linear"]
+
+    @cached_property
+    def measured(self) -> dict[str, Measured]:
+        """How each axis is interpolated, and its error, at the middle of all others."""
+        middle = self._middle()
+        found: dict[str, Measured] = {}
+        for name, one in self._axes.items():
+            if one.number and len(one.nodes) > 1:
+                line = middle | {name: np.arange(len(one.nodes))}
+                value, stderr = (
+                    array.reshape(len(one.nodes), *array.shape[len(middle) :])
+                    for array in self._contents.read(line)
+                )
+                found[name] = _measure(name, one.nodes, value, stderr)
+                _warn_if_coarse(name, found[name])
+        value, stderr = (
+            array.reshape(array.shape[len(middle) :])
+            for array in self._contents.read(middle)
+        )
+        nodes = self._theta_i
+        if len(nodes) == 2:
+            found["theta_i"] = _of_two("theta_i", value)
+        elif len(nodes) > 2:
+            found["theta_i"] = best(
+                nodes, lambda scheme: incidence_trial(self._lobes(value, stderr, scheme))
+            )
+            _warn_if_coarse("theta_i", found["theta_i"])
+        return found
+
+
+def _measure(
+    name: str, nodes: np.ndarray, value: np.ndarray, stderr: np.ndarray
+) -> Measured:
+    if len(nodes) == 2:
+        return _of_two(name, value)
+    return best(nodes, lambda scheme: parameter_trial(scheme, nodes, value, stderr))
+
+
+def _warn_if_coarse(name: str, measured: Measured) -> None:
+    """Say where values lie so far apart that left-out ones tell nothing of the gaps."""
+    worst = float(measured.at_nodes[0, 0, 0])
+    if worst > COARSE:
+        msg = (
+            f"the store's values of {name} must lie closer: one of them left out is missed "
+            f"by {100 * worst:.2g} % of M00 where it is bright, which says little of the "
+            "gaps. Errors between them are guesses. Compute more values by a sweep."
+        )
+        warnings.warn(msg, AccuracyWarning, stacklevel=2)
+
+
+def _of_two(name: str, value: np.ndarray) -> Measured:
+    """Return what is known between two nodes, and say that it is not much."""
+    between = midway(value[0], value[1], 0.5)
+    worst = 100 * between[:2, 0, 0].max()
+    msg = (
+        f"the store has two values of {name}, none to leave out: half their difference, up "
+        f"to {worst:.2g} % of M00 where it is bright, stands for the error between them. "
+        "Compute a third by a sweep."
+    )
+    warnings.warn(msg, AccuracyWarning, stacklevel=2)
+    return Measured(SCHEMES["linear in ln M00"], np.full_like(between, np.nan), between)
