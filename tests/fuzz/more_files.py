@@ -19,6 +19,7 @@ import pbrdf
 from pbrdf.signatures.bands import read_response
 from pbrdf.signatures.skies import read_sky
 from pbrdf.sweeps import load_sweep
+from tests.cli.scenes import SCENE
 from tests.fuzz.good_files import written
 
 Content = bytes | dict[str, bytes]
@@ -144,17 +145,7 @@ material = "water"
 
 
 def sweep_toml() -> bytes:
-    return b"""
-[surface]
-type = "gaussian"
-shape = [64, 64]
-spacing_um = 1.0
-corr_length_um = 16.0
-slope_rms = 0.2
-
-[substrate]
-n = 1.5
-
+    return f"""{SCENE}
 [vary]
 slope_rms = [0.1, 0.2, 0.3]
 "substrate.n" = [1.4, 1.5]
@@ -163,7 +154,7 @@ slope_rms = [0.1, 0.2, 0.3]
 theta_i_deg = [10, 30]
 n_rays = 1000
 realizations = 8
-"""
+""".encode()
 
 
 def small_result() -> xr.Dataset:

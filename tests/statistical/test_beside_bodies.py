@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 from pbrdf import Drops, Film, GaussianSurface, Material, Scene, Spheres, simulate
 from pbrdf.simulation import simulate_parts
+from tests.statistical.estimators import hold_together
 
 GLASS, WATER = Material(1.5), Material(1.333)
 SURFACE = GaussianSurface(shape=(72, 72), spacing=1.0, corr_length=6.0, slope_rms=0.2)
@@ -40,18 +41,7 @@ def test_all_elements_of_all_bounces_agree_with_rays(phi_i, wet):
     )  # fmt: skip
     assert reduced.attrs["variance_reduction"] == REDUCED
     assert plain.attrs["variance_reduction"] == "none"
-    for name in ("brdf", "brdf_total", "albedo"):
-        value, error = reduced[name].values, reduced[f"{name}_stderr"].values
-        other, spread = plain[name].values, plain[f"{name}_stderr"].values
-        light = other if name == "albedo" else other[..., :1, :1]
-        known = spread if name == "albedo" else spread[..., :1, :1]
-        lit = np.broadcast_to(light > 10 * known, value.shape) & (spread > 0)
-        z = (value - other)[lit] / np.hypot(error, spread)[lit]
-        assert np.abs(z).max() < 5
-        if name != "albedo":
-            assert z.size > 150
-            # Correlated bins: limits of a mean square of some hundred numbers
-            assert 0.6 < np.sqrt(np.mean(z**2)) < 1.3
+    hold_together(reduced, plain, fewest=150, most_rms=1.3)
     budget = reduced.albedo.sum("bounces") + reduced.absorbed
     budget += reduced.truncated + reduced.leaked
     # Chance decides on the weakest parts of split rays

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pbrdf import GaussianSurface, Material, Scene, simulate
+from tests.statistical.estimators import hold_together
 
 GOLD_LIKE = Material(0.958, 6.69)
 # Facets are a sixth of the correlation length wide: what depends on the mesh is seen
@@ -24,18 +25,7 @@ def test_all_elements_of_all_bounces_agree_with_rays(phi_i):
     )  # fmt: skip
     assert reduced.attrs["variance_reduction"] == "single bounces"
     assert plain.attrs["variance_reduction"] == "none"
-    for name in ("brdf", "brdf_total", "albedo"):
-        value, error = reduced[name].values, reduced[f"{name}_stderr"].values
-        other, spread = plain[name].values, plain[f"{name}_stderr"].values
-        light = other if name == "albedo" else other[..., :1, :1]
-        known = spread if name == "albedo" else spread[..., :1, :1]
-        lit = np.broadcast_to(light > 10 * known, value.shape) & (spread > 0)
-        z = (value - other)[lit] / np.hypot(error, spread)[lit]
-        assert np.abs(z).max() < 5
-        if name != "albedo":
-            assert z.size > 400
-            # Correlated bins: limits of a mean square of some hundred numbers
-            assert 0.6 < np.sqrt(np.mean(z**2)) < 1.25
+    hold_together(reduced, plain, fewest=400, most_rms=1.25)
 
 
 def test_single_bounces_have_less_noise():
