@@ -12,6 +12,7 @@ import xarray as xr
 
 import data_io
 import pbrdf
+from docs.name_tables import PAGE, renewed
 from docs.notebook_pages import NOTEBOOKS, page
 from fitting import surface_statistics
 from fitting.models.cuts import plane_curves
@@ -48,6 +49,7 @@ def main() -> None:
         text = page(notebook, DOCS / "gallery")
         (DOCS / f"notebook_{notebook.stem}.md").write_text(text, encoding="utf-8")
     (DOCS / "api.md").write_text(reference(), encoding="utf-8")
+    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
     log = (DOCS.parent / "CHANGELOG.md").read_text(encoding="utf-8")
     (DOCS / "changelog.md").write_text(log, encoding="utf-8")
 

@@ -64,20 +64,89 @@ print(hidden.brdf(1.4, 1.4, 3.0)[0, 0] / model.brdf(1.4, 1.4, 3.0)[0, 0])
 """
 
 
+DIFFS = re.findall(r"```diff\n(.*?)```", PAGE, flags=re.DOTALL)
+
+
+def example(word: str, language: str = "python") -> str:
+    """Return the one block of code of the page in which a word stands."""
+    blocks = re.findall(rf"```{language}\n(.*?)```", PAGE, flags=re.DOTALL)
+    (found,) = (code for code in blocks if word in code)
+    return found
+
+
 def test_a_slope_law_is_added_in_two_files(copied: Path) -> None:
-    diff = re.findall(r"```diff\n(.*?)```", PAGE, flags=re.DOTALL)
-    apply(diff[0], copied)
-    assert len(re.findall(r"^--- a/", diff[0], flags=re.MULTILINE)) == 2
+    apply(DIFFS[0], copied)
+    assert len(re.findall(r"^--- a/", DIFFS[0], flags=re.MULTILINE)) == 2
     area, shadowing = map(float, run(copied, "-c", USE).split())
     assert abs(area - 1.0) < 1e-6
     assert 0.2 < shadowing < 0.99
 
 
-def test_a_command_is_added_by_one_module(copied: Path) -> None:
-    text = next(
-        code for code in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
-        if "def command" in code
-    )  # fmt: skip
-    (copied / "pbrdf/cli/showing/brewster.py").write_text(text)
-    assert run(copied, "-m", "pbrdf", "brewster", "bk7").startswith("56.6")
-    assert "p light is reflected least" in run(copied, "-m", "pbrdf", "--help")
+USE_ALL = """
+import numpy as np
+from pathlib import Path
+from pbrdf import Material, MicrofacetModel, load_scene, materials, simulate
+from pbrdf.cli import main
+from data_io import read_goniometer
+from fitting import fit
+
+print(float(materials.get("evaporated").index(0.35)[0]))
+main(["brewster", "bk7"])
+main(["--help"])
+Path("scan.txt").write_text("SPHERE 1\\n30 -40 0.2\\n30 20 0.1\\n")
+scan = read_goniometer("scan.txt")
+print(scan.attrs["format"], *np.degrees(scan.dphi.values))
+Path("scene.toml").write_text(SCENE)
+scene = load_scene("scene.toml")
+run = simulate(scene, [0.5], n_rays=40, realizations=2, n_theta=3, n_dphi=4)
+parts = (run.albedo, run.absorbed, run.truncated, run.leaked)
+print(type(scene.contaminants[0]).__name__, sum(float(part.sum()) for part in parts))
+scene.to_toml("again.toml")
+print(load_scene("again.toml").contaminants == scene.contaminants)
+view = np.linspace(-1.2, 1.2, 13)
+model = MicrofacetModel(Material(1.5), slope_rms=0.3, diffuse_albedo=0.1)
+truth = model.brdf(0.5, np.abs(view), np.where(view > 0, np.pi, 0.0))
+pairs = zip(np.degrees(view), truth[:, 0, 0])
+rows = "\\n".join(f"{np.degrees(0.5)},{v},{m}" for v, m in pairs)
+Path("scan.csv").write_text("theta_i_deg,theta_view_deg,M00\\n" + rows)
+begin = model.with_parameters(diffuse_albedo=0.2)
+found = fit(read_goniometer("scan.csv"), begin, solver="simplex")
+print(float(found.estimates["diffuse_albedo"].value))
+"""
+SCENE = """
+[surface]
+type = "flat"
+size_um = 20.0
+
+[substrate]
+n = 1.5
+
+[[contaminants]]
+type = "bead"
+radius_um = 3.0
+material = { n = 1.333 }
+"""
+
+
+def test_everything_else_is_added_in_one_place(copied: Path) -> None:
+    for diff in DIFFS[1:]:
+        apply(diff, copied)
+    for place, word in (
+        ("pbrdf/cli/showing/brewster.py", "def command"),
+        ("data_io/goniometer/formats/sphere.py", "def looks_like"),
+        ("pbrdf/contaminants/beads.py", "class Bead"),
+        ("fitting/solvers/simplex.py", "def solve_simplex"),
+    ):
+        (copied / place).write_text(example(word))
+    table = example("evaporated gold", "csv")
+    (copied / "pbrdf/optics/tables/evaporated.csv").write_text(table)
+    said = run(copied, "-c", f"SCENE = {SCENE!r}\n{USE_ALL}")
+    index, angle, *help_, scan, bead, same, albedo = said.splitlines()
+    assert abs(float(index) - 0.5 * (1.596 + 1.470)) < 1e-12
+    assert angle.startswith("56.6")
+    assert "p light is reflected least" in "".join(help_)
+    assert scan.split() == ["sphere", "180.0", "0.0"]
+    assert bead.startswith("Bead ")
+    assert abs(float(bead.split()[1]) - 1.0) < 1e-3
+    assert same == "True"
+    assert abs(float(albedo) - 0.1) < 1e-4

@@ -29,7 +29,7 @@ SOLVERS: dict[str, Callable[[Objective], Solution]] = {
     "nlopt": solve_nlopt,
 }
 
-# From a point that is nearly the minimum
+# From a point that is nearly the minimum; a solver without one starts again
 _REFINERS: dict[str, Callable[[Objective], Solution]] = {
     "casadi": refine_casadi,
     "nlopt": refine_nlopt,
@@ -177,7 +177,7 @@ class Problem:
             if attempt == 0 and after is None and not near:
                 solution = self._minimise(objective)
             else:
-                solution = _REFINERS[self.solver](objective)
+                solution = self._refine(objective)
             count += solution.n_evaluations
             if not changes or not solution.converged:
                 break
@@ -195,7 +195,11 @@ class Problem:
 
     def minimise(self, *, begin: np.ndarray) -> Solution:
         """Fit once from `begin`, with the standard errors of the readings as they are."""
-        return _REFINERS[self.solver](self.objective.started_at(begin))
+        return self._refine(self.objective.started_at(begin))
+
+    def _refine(self, objective: Objective) -> Solution:
+        """Go on from a point that is nearly the minimum."""
+        return _REFINERS.get(self.solver, SOLVERS[self.solver])(objective)
 
     def _minimise(self, objective: Objective) -> Solution:
         """Run the solver from each start and keep the lowest end."""

@@ -34,6 +34,7 @@ __all__ = [
     "Scan",
     "Seed",
     "Shadowing",
+    "SlopeLaw",
     "SourceHalfAngle",
     "Spacing",
     "Surface",
@@ -220,7 +221,20 @@ Free = Annotated[
         help="Parameters to fit, separated by commas: specular_gain, n, kappa, ..."
     ),
 ]
-Shadowing = Annotated[str, typer.Option(help="Shadowing of the analytical model.")]
+Shadowing = Annotated[
+    str,
+    typer.Option(
+        help="Shadowing rule of the analytical model; an unknown name lists all that exist."
+    ),
+]
+SlopeLaw = Annotated[
+    str | None,
+    typer.Option(
+        "--slope-distribution",
+        help="Slope distribution of the analytical model, by default gaussian; an unknown "
+        "name lists all that exist.",
+    ),
+]
 Rays = Annotated[
     int,
     typer.Option(

@@ -9,6 +9,7 @@ from pbrdf.contaminants import Drops, Film, Spheres
 from pbrdf.notebook import table
 from pbrdf.optics import library
 from pbrdf.optics.materials import Material
+from pbrdf.scene.contaminant_tables import KINDS
 from pbrdf.scene.refusals import check_clear, check_on_mesh
 from pbrdf.scene.write import write_scene
 from pbrdf.surface import FixedSurface, MeshSurface, Surface
@@ -108,11 +109,14 @@ class Scene:
 
 def _checked(given: Contamination | Sequence[Contamination]) -> tuple[Contamination, ...]:
     """Return the contaminants as a tuple; refuse other types and a second film."""
-    listed = (given,) if isinstance(given, Contamination) else tuple(given)
+    known = tuple(KINDS.values())
+    listed: tuple[Contamination, ...]
+    listed = (given,) if isinstance(given, known) else tuple(given)  # type: ignore[arg-type]
     for number, one in enumerate(listed):
-        if not isinstance(one, Contamination):
+        if not isinstance(one, known):
+            *others, last = (kind.__name__ for kind in known)
             msg = (
-                "contaminants must be Drops, Spheres or Film, got "
+                f"contaminants must be {', '.join(others)} or {last}, got "
                 f"{type(one).__name__} at index {number}. Wrap what lies on the surface "
                 "in one of these."
             )

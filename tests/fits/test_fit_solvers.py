@@ -10,11 +10,9 @@ from fitting.objective.losses import LOSSES
 from fitting.objective.objective import Objective, Prediction
 from fitting.objective.parameters import Parameter, bounded_parameter
 from fitting.objective.uncertainty import information
+from fitting.problem.problem import SOLVERS
 from fitting.solvers.casadi_solver import solve_casadi
 from fitting.solvers.global_search import SEARCHES, starts
-from fitting.solvers.nlopt_solver import solve_nlopt
-
-SOLVERS = [solve_casadi, solve_nlopt]
 
 
 def linear_objective(matrix, data, parameters, stderr=None):
@@ -28,7 +26,7 @@ def linear_objective(matrix, data, parameters, stderr=None):
     )
 
 
-@pytest.mark.parametrize("solve", SOLVERS)
+@pytest.mark.parametrize("solve", SOLVERS.values(), ids=SOLVERS)
 @pytest.mark.parametrize("seed", range(6))
 def test_bounded_linear_problem_equals_bvls(solve, seed):
     rng = np.random.default_rng(seed)
@@ -45,7 +43,7 @@ def test_bounded_linear_problem_equals_bvls(solve, seed):
     assert_allclose(solution.x, expected.x, rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.parametrize("solve", SOLVERS)
+@pytest.mark.parametrize("solve", SOLVERS.values(), ids=SOLVERS)
 def test_prior_is_a_measurement_of_the_parameter(solve):
     # Mean of 3 +- 0.2 (twice) and a prior of 5 +- 0.1, weights 1/variance
     parameter = Parameter(name="mean", value=0.0, prior_value=5.0, prior_stderr=0.1)
@@ -81,7 +79,7 @@ def test_losses_equal_their_textbook_functions(loss):
     assert_allclose(gradient, slope / (2 * step), rtol=1e-6)
 
 
-@pytest.mark.parametrize("solve", SOLVERS)
+@pytest.mark.parametrize("solve", SOLVERS.values(), ids=SOLVERS)
 def test_robust_loss_ignores_an_outlier(solve):
     rng = np.random.default_rng(5)
     t = np.linspace(0.0, 1.0, 40)
@@ -100,7 +98,7 @@ def test_robust_loss_ignores_an_outlier(solve):
     assert abs(solve(plain).x[0] - 2.0) > 0.5
 
 
-@pytest.mark.parametrize("solve", SOLVERS)
+@pytest.mark.parametrize("solve", SOLVERS.values(), ids=SOLVERS)
 def test_a_curve_that_is_not_finite_is_a_result_with_a_reason(solve):
     x = casadi.MX.sym("x")
     curve = Prediction(casadi.Function("curve", [x], [casadi.sqrt(x - 1.0)]))
@@ -113,7 +111,7 @@ def test_a_curve_that_is_not_finite_is_a_result_with_a_reason(solve):
     assert solution.status == "stopped: the curve is not finite at the start"
 
 
-@pytest.mark.parametrize("solve", SOLVERS)
+@pytest.mark.parametrize("solve", SOLVERS.values(), ids=SOLVERS)
 def test_a_minimum_at_infinity_is_not_called_converged(solve):
     # exp(-x) falls for ever: there is no minimum to find
     x = casadi.MX.sym("x")
@@ -159,7 +157,7 @@ def test_an_unknown_search_is_named():
         starts(objective, "annealing")
 
 
-@pytest.mark.parametrize("solve", SOLVERS)
+@pytest.mark.parametrize("solve", SOLVERS.values(), ids=SOLVERS)
 def test_fixed_parameters_stay(solve):
     rng = np.random.default_rng(2)
     matrix, data = rng.normal(size=(9, 2)), rng.normal(size=9)

@@ -74,6 +74,7 @@ def command(
             help="Those of them that each scan has for itself; or n=wavelength, n=nothing."
         ),
     ] = "",
+    slope_distribution: options.SlopeLaw = None,
     shadowing: options.Shadowing = "smith-correlated",
     wavelength: options.Wavelength = None,
     columns: declaring.ScanColumns = None,
@@ -85,7 +86,9 @@ def command(
     blocked: options.Blocked = 0.0,
     source_half_angle: declaring.SourceCone = None,
     detector_half_angle: declaring.DetectorCone = None,
-    solver: Annotated[str, typer.Option(help="casadi or nlopt.")] = "casadi",
+    solver: Annotated[
+        str, typer.Option(help="Solver; an unknown name lists all that exist.")
+    ] = "casadi",
     loss: Annotated[
         str, typer.Option(help="linear, or soft_l1, huber, cauchy against outliers.")
     ] = "linear",
@@ -126,18 +129,14 @@ def command(
         model: MicrofacetModel | SimulatedModel | WaveSurface
         heights = height_rms, corr_length, reach
         if scene is None:
-            material = read_material(
-                n, kappa, material_file, options.names(material_ignore)
-            )
-            model = _closed_form(material, slope_rms, shadowing, heights)
+            ignored = option_text.names(material_ignore)
+            material = read_material(n, kappa, material_file, ignored)
+            rules = {"shadowing": shadowing, "slope_distribution": slope_distribution}
+            model = _closed_form(material, slope_rms, rules, heights)
         else:
-            alone = (n, slope_rms, material_file, height_rms, corr_length)
-            if any(value is not None for value in alone):
-                msg = (
-                    "--n, --slope-rms and heights come from the --scene, got both. Leave "
-                    "one out."
-                )
-                raise ValueError(msg)
+            _check_alone(
+                n, slope_rms, slope_distribution, material_file, height_rms, corr_length
+            )
             traced = {
                 "n_rays": n_rays, "realizations": realizations, "seed": seed,
                 "workers": workers, "progress": progress,
@@ -169,6 +168,13 @@ def command(
         raise typer.Exit(1)
 
 
+def _check_alone(*given: float | str | None) -> None:
+    """Refuse beside a scene what it has itself."""
+    if any(value is not None for value in given):
+        msg = "--n, slopes and heights come from the --scene, got both. Leave one out."
+        raise ValueError(msg)
+
+
 def _read_scans(
     paths: list[Path], wavelength: float | None, declared: dict[str, Any]
 ) -> "dict[str, xr.Dataset]":
@@ -196,7 +202,7 @@ def _separate(text: str) -> dict[str, str]:
 
 
 def _analytic(
-    material: "Material | None", slope_rms: float | None, shadowing: str
+    material: "Material | None", slope_rms: float | None, rules: dict[str, Any]
 ) -> "MicrofacetModel":
     """Return the analytical model to start from."""
     from pbrdf import MicrofacetModel
@@ -205,19 +211,20 @@ def _analytic(
         option = "--n" if material is None else "--slope-rms"
         msg = f"{option} must be given, got none. Or give a --scene, which has both."
         raise ValueError(msg)
-    return MicrofacetModel(material, slope_rms=slope_rms, shadowing=shadowing)
+    chosen = {name: rule for name, rule in rules.items() if rule is not None}
+    return MicrofacetModel(material, slope_rms=slope_rms, **chosen)
 
 
 def _closed_form(
     material: "Material | None",
     slope_rms: float | None,
-    shadowing: str,
+    rules: dict[str, Any],
     heights: tuple[float | None, float | None, float],
 ) -> "MicrofacetModel | WaveSurface":
     """Return the model to start from: by slope, or by height, length and reach."""
     height_rms, corr_length, reach = heights
     if height_rms is None and corr_length is None:
-        return _analytic(material, slope_rms, shadowing)
+        return _analytic(material, slope_rms, rules)
     from fitting import WaveSurface
     from pbrdf import WaveModel
 
@@ -230,10 +237,11 @@ def _closed_form(
         if value is None:
             msg = f"{option} must be given where waves are fitted, got none."
             raise ValueError(msg)
-    if slope_rms is not None:
+    if slope_rms is not None or rules["slope_distribution"] is not None:
+        option = "--slope-distribution" if slope_rms is None else "--slope-rms"
         msg = (
-            f"--slope-rms must be left out beside --height-rms-um, got {slope_rms:g}: "
-            "height and length make it."
+            f"{option} must be left out beside --height-rms-um, got "
+            f"{slope_rms or rules['slope_distribution']}: height and length make the slope."
         )
         raise ValueError(msg)
     assert material is not None  # looked at above

@@ -75,7 +75,7 @@ def command(
 
     target = output or Path(f"{scan.stem}-model")
     material = _needed(
-        read_material(n, kappa, material_file, options.names(material_ignore))
+        read_material(n, kappa, material_file, option_text.names(material_ignore))
     )
     declared = declaring.declarations(
         scan_columns, azimuth_of_forward, angles, quantity, normalised,

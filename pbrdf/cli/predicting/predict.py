@@ -88,7 +88,7 @@ def command(
     from pbrdf.cli.reading import read_material, read_scan, read_surface
     from pbrdf.cli.staging import staged_file
 
-    material = read_material(n, kappa, material_file, options.names(material_ignore))
+    material = read_material(n, kappa, material_file, option_text.names(material_ignore))
     if material is None:
         msg = "--n must be given, got none. Or give a --material-file."
         raise ValueError(msg)
