@@ -55,10 +55,10 @@ demo-seeds: .venv/.run
 	@$(BIN)/python examples/seeds.py
 
 test: .venv/.dev
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 test-all: .venv/.dev
-	$(BIN)/python -m pytest -n auto -m "not bench"
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "not bench"
 
 lint: .venv/.dev
 	$(BIN)/ruff check .
@@ -67,7 +67,7 @@ lint: .venv/.dev
 	$(BIN)/python -m pytest -q tests/test_layers.py
 
 stability: .venv/.dev
-	$(BIN)/python -m pytest -q -n auto -m "not bench" --stability tests/hazards \
+	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not bench" --stability tests/hazards \
 		tests/laws/test_tracer_symmetry.py tests/statistical/test_tracer_error_bars.py \
 		tests/analytic/test_tracer_facets.py tests/contaminants/test_films.py \
 		tests/contaminants/test_drops_exact.py

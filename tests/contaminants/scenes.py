@@ -1,5 +1,7 @@
 """Runs of contaminated scenes whose answers are known, and verdicts on them."""
 
+from functools import cache
+
 import numpy as np
 
 from pbrdf import HeightMap, Scene, simulate
@@ -15,11 +17,34 @@ def whole(result):
     return flux.isel(theta_i=0).sum(("theta_s", "dphi")).values
 
 
-def flat_runs(substrate, contaminants, theta, *, seeds=24, size=(1.0, 1.0), **options):
-    """Mean of the whole Mueller matrix over seeds, its standard error, and one result."""
-    scene = Scene(HeightMap.flat(size=size), substrate, contaminants)
-    results = [simulate(scene, theta, seed=k, **options) for k in range(seeds)]
-    matrices = np.array([whole(r) for r in results])
+@cache
+def _runs(scene, angles, seeds, options):
+    """Run a scene under several seeds, all incidences at once."""
+    return [simulate(scene, angles, seed=k, **dict(options)) for k in range(seeds)]
+
+
+@cache
+def _flat(described, size):
+    """Return one scene of those that read alike, which `_runs` then knows again."""
+    return Scene(HeightMap.flat(size=size), *_DESCRIBED[described])
+
+
+_DESCRIBED = {}
+
+
+def flat_runs(
+    substrate, contaminants, theta, *, among=None, seeds=24, size=(1.0, 1.0), **options
+):
+    """Mean of the whole Mueller matrix over seeds, its standard error, and one result.
+
+    Tests that differ in theta only share their runs if they name all angles `among`.
+    """
+    angles = (theta,) if among is None else tuple(among)
+    described = f"{substrate!r} {contaminants!r}"
+    _DESCRIBED.setdefault(described, (substrate, contaminants))
+    results = _runs(_flat(described, size), angles, seeds, tuple(options.items()))
+    results = [one.isel(theta_i=[angles.index(theta)]) for one in results]
+    matrices = np.array([whole(one) for one in results])
     stderr = matrices.std(axis=0, ddof=1) / np.sqrt(seeds)
     return matrices.mean(axis=0), stderr, results[0]
 

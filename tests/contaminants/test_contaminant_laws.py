@@ -183,6 +183,7 @@ def mean_matrix(zeniths, target, seed):
     return over.transpose("dphi", ...).values
 
 
+@pytest.mark.slow
 def test_reciprocity_among_bodies():
     steps = np.deg2rad((np.arange(4) + 0.5) / 4 * 10)
     there = [mean_matrix(np.deg2rad(10) + steps, 5, 2 * k) for k in range(24)]

@@ -96,6 +96,7 @@ def test_folding_averages_each_bin_with_its_mirror_image(flat):
     assert_folded(fold, plain)
 
 
+@pytest.mark.slow
 def test_folded_runs_agree_with_others_and_state_half_the_variance():
     """Of independent seeds, over all elements: the image is an estimate of the same."""
     # Spheres, for they are laid so much faster than drops

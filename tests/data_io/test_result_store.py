@@ -244,6 +244,7 @@ def test_a_store_takes_what_no_memory_holds(folder, monkeypatch, capsys):
     assert read_result(folder / "r.zarr").sizes["theta_i"] == 12
 
 
+@pytest.mark.slow
 def test_a_store_takes_wavelengths_that_no_memory_holds(folder, monkeypatch, capsys):
     """Not one direction fits with all of them."""
     size = memory.Size(angles=1, azimuths=1, waves=60, bins=30 * 30, n_stokes=4)

@@ -9,6 +9,7 @@ import time
 import warnings
 import zipfile
 import zlib
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +78,7 @@ def laughs(line: str) -> bytes:
     ).encode()
 
 
+@cache
 def tiff(side: int) -> bytes:
     """Write a square picture of one grey that is packed a thousand times."""
     squeeze = zlib.compressobj(9)
@@ -93,6 +95,7 @@ def heights(path: Path) -> object:
     return data_io.read_height_map(path, spacing=1.0, um_per_level=0.1)
 
 
+# Reader and content; one that takes time to make is a function
 MESH, CONSTANTS = pbrdf.MeshSurface, pbrdf.materials.read
 KINDS = {
     "stl": (".stl", MESH, bytes(80) + struct.pack("<I", 2**32 - 1) + bytes(500)),
@@ -117,14 +120,14 @@ KINDS = {
         json.dumps(gltf(buffers=[{"byteLength": 36, "uri": "/dev/zero"}])).encode(),
     ),
     "npz of a header": (".npz", MESH, npz(2**40, 10)),
-    "npz of zeros": (".npz", MESH, npz(2**22, 3 * 8 * 2**22)),
+    "npz of zeros": (".npz", MESH, lambda: npz(2**22, 3 * 8 * 2**22)),
     "aliases": (".yml", CONSTANTS, laughs("a{0}: &a{0} [{1}]\n")),
     "merged aliases": (".yml", CONSTANTS, laughs("a{0}: &a{0} {{{{<<: [{1}]}}}}\n")),
     "deep": (".yml", CONSTANTS, b"DATA:\n  - type: " + b"[" * 100_000),
     "deep keys": (".yml", CONSTANTS, b"? " * 20_000 + b"a"),
     "many parts": (".yml", CONSTANTS, b"DATA:\n" + b"  - {type: a}\n" * 400_000),
-    "tiff of heights": (".tif", heights, tiff(16_000)),
-    "tiff": (".tif", lambda p: data_io.read_profile_image(p, 1.0), tiff(16_000)),
+    "tiff of heights": (".tif", heights, lambda: tiff(16_000)),
+    "tiff": (".tif", lambda p: data_io.read_profile_image(p, 1.0), lambda: tiff(16_000)),
 }  # fmt: skip
 
 
@@ -146,7 +149,7 @@ def peak() -> int:
 def test_hostile_files_are_refused(tmp_path, kind):
     suffix, read, content = KINDS[kind]
     path = tmp_path / f"hostile{suffix}"
-    path.write_bytes(content)
+    path.write_bytes(content() if callable(content) else content)
     refused(path, read)
 
 

@@ -66,6 +66,7 @@ def small_result() -> xr.Dataset:
     )
 
 
+@pytest.mark.slow
 def test_any_flipped_bit_is_seen_or_harmless(tmp_path):
     """Half of all bytes are padding of HDF5; none may change a value without a word."""
     path = tmp_path / "result.nc"

@@ -103,6 +103,7 @@ def test_estimated_noise_finds_shape_and_size(shape):
         assert abs(result.values[name] - value) < 4 * result.stderr[name]
 
 
+@pytest.mark.slow
 def test_stderr_that_is_a_percentage_of_the_reading_does_not_pull_the_fit_low():
     # 5 % noise and errors stated as 5 % of the noisy reading: low readings gain weight
     bias = []

@@ -87,6 +87,7 @@ def test_own_slopes_describe_their_scan(rugged: PipelineResult) -> None:
     assert REDRAWN in texts[2]
 
 
+@pytest.mark.slow
 def test_a_gaussian_map_has_the_slopes_of_its_gaussian() -> None:
     own = piped(gaussian_map()).measured_slopes
     assert own is not None

@@ -187,6 +187,7 @@ def test_an_unpolarised_scan_says_what_cannot_be_known(
     assert "no measurement supports them" in (tmp_path / "out" / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_each_wavelength_has_its_folder_and_a_place_in_the_spectrum(tmp_path: Path) -> None:
     write_profile(tmp_path / "profile.csv")
     write_scan(tmp_path / "one.csv", ("M00", "M10"))

@@ -81,6 +81,7 @@ def test_truth_is_recovered_whatever_the_instrument(spacing, noise, step):
     assert (np.abs(np.log(ratio)) < 4 / np.sqrt(2 * n_real)).all()
 
 
+@pytest.mark.slow
 def test_known_blur_and_correlated_noise_are_made_good():
     """As a located edge has them; unsaid, blur takes slope and such noise adds it."""
     rng = np.random.default_rng(12)
@@ -342,6 +343,7 @@ def test_other_types_are_refused():
         surface_statistics(profile(z)).slope_histogram("y")
 
 
+@pytest.mark.slow
 def test_intervals_of_nearly_straight_edges_in_noise_hold_the_truth():
     """Five correlation lengths in noise of twice the height; first order held 3 in 4."""
     n, step, height, length, noise = 340, 0.1176, 0.02, 8.0, 0.05

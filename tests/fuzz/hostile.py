@@ -27,8 +27,14 @@ MAP = (
 SCAN = "theta_i_deg,theta_view_deg,M00\n{}\n"
 
 
-def content(of: bytes | str) -> Write:
-    return lambda path: path.write_bytes(of.encode() if isinstance(of, str) else of)
+def content(of: bytes | str | Callable[[], bytes]) -> Write:
+    """Return how to write a content; one that takes time to make is made then."""
+
+    def write(path: Path) -> None:
+        held = of() if callable(of) else of
+        path.write_bytes(held.encode() if isinstance(held, str) else held)
+
+    return write
 
 
 def result() -> xr.Dataset:
@@ -174,19 +180,21 @@ KINDS: dict[str, Write] = {
     "link.zarr": store(lambda p: (p / "brdf" / "x").symlink_to("/etc/passwd")),
     "deep.zarr": store(lambda p: (p / "brdf" / "zarr.json").write_text(100_000 * "[")),
     "sweep.zarr": sweep_store,
-    "bomb.x3p": content(zipped(**{"main.xml": b"<a>" + bytes(2**28)})),
-    "entity.x3p": content(zipped(**{"main.xml": _ENTITY.encode("utf-16")})),
-    "deep.x3p": content(zipped(**{"main.xml": 200_000 * b"<a>"})),
-    "many.x3p": content(zipped(**{f"a{k}": b"" for k in range(70_000)})),
+    "bomb.x3p": content(lambda: zipped(**{"main.xml": b"<a>" + bytes(2**28)})),
+    "entity.x3p": content(lambda: zipped(**{"main.xml": _ENTITY.encode("utf-16")})),
+    "deep.x3p": content(lambda: zipped(**{"main.xml": 200_000 * b"<a>"})),
+    "many.x3p": content(lambda: zipped(**{f"a{k}": b"" for k in range(70_000)})),
     "huge.npy": content(npy((2**40, 2**20))),
     "negative.npy": content(npy((-4, -4), bytes(128))),
     "object.npy": content(npy((4, 4), b"cos\nsystem\n(S'id'\ntR.", "|O")),
     "far.npy": lambda p: np.save(p, _WIDE),
     "nan.npy": lambda p: np.save(p, np.full((64, 64), np.nan)),
     "inf.npy": lambda p: np.save(p, np.full((64, 64), np.inf)),
-    "header.npz": content(zipped(**{"vertices.npy": npy((2**40, 3)), "faces.npy": b""})),
-    "bomb.npz": content(zipped(**{"vertices.npy": npy((2**24, 3), bytes(2**28))})),
-    "bomb.xlsx": content(zipped(**{"xl/workbook.xml": bytes(2**28)})),
+    "header.npz": content(
+        lambda: zipped(**{"vertices.npy": npy((2**40, 3)), "faces.npy": b""})
+    ),
+    "bomb.npz": content(lambda: zipped(**{"vertices.npy": npy((2**24, 3), bytes(2**28))})),
+    "bomb.xlsx": content(lambda: zipped(**{"xl/workbook.xml": bytes(2**28)})),
     "dots.toml": content("a" + 100_000 * ".a" + " = 1"),
     "keys.toml": content("".join(f"a.b{k}.c = 1\n" for k in range(100_000))),
     "deep.toml": content("a = " + 50_000 * "["),
@@ -217,10 +225,10 @@ KINDS: dict[str, Write] = {
     ),
     "axis.prf": content("1 2\nCX I 1e300 MM 1.0 D\nCZ A 1e300 UM 1.0 D\nEOR\n1\nEOR\n"),
     "bomb.sur": content(
-        b"DSCOMPRESSED" + bytes(500) + pack("<III", 1, 2**28, 2**18)
+        lambda: b"DSCOMPRESSED" + bytes(500) + pack("<III", 1, 2**28, 2**18)
         + zlib.compress(bytes(2**28))
     ),
-    "bomb.png": content(png(100_000, 100_000)),
-    "wide.png": content(png(2_000_000_000, 1)),
+    "bomb.png": content(lambda: png(100_000, 100_000)),
+    "wide.png": content(lambda: png(2_000_000_000, 1)),
     "text.png": content("no picture"),
 }  # fmt: skip

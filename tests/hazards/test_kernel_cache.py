@@ -129,6 +129,7 @@ print(cube(argument), sum(cube.stats.cache_misses.values()), flush=True)
 """
 
 
+@pytest.mark.slow
 def test_processes_that_start_at_once_compile_each_kernel_once(tmp_path: Path) -> None:
     """Without the lock two compile the same, and the index names one of three entries."""
     script = tmp_path / "counted.py"
