@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import comb
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,16 +10,15 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Curve", "brightness", "curves_of", "noise_of", "stderr_of", "together"]
+__all__ = ["Curve", "brightness", "curves_of", "scatter_of", "stderr_of", "together"]
 
 # Spread of one angle [rad] and of one wavelength [um] as they are read back
 ENCODER, READ_BACK = np.deg2rad(0.05), 2.5e-4
 
 # sin(theta_s) |sin(dphi)| of a reading that counts as in plane
 _PLANE = 2e-3
-# Second differences of independent readings have six times their variance; and the median
-# of the size of a normal number is 0.6745 standard deviations
-_SECOND, _MEDIAN = np.sqrt(6.0), 0.6745
+# The median of the size of a normal number, in standard deviations
+_MEDIAN = 0.6745
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +136,48 @@ def together(values: np.ndarray, within: float) -> np.ndarray:
     return label
 
 
-def noise_of(values: np.ndarray) -> float:
-    """Return the scatter of even readings about a smooth curve, NaN of fewer than 8."""
-    if values.size < 8:
+def scatter_of(values: np.ndarray, unit: np.ndarray) -> float:
+    """Return the scatter of even readings about a smooth curve, in units of each reading.
+
+    Differences of order 2 to 4, of the readings and of their logarithms, see the noise
+    alike, and a smooth curve differently: the least of them holds least of it, and errs low
+    by up to a half where few readings are bright. NaN of fewer than 12.
+
+    Parameters
+    ----------
+    values, unit : ndarray, shape (n,)
+        Readings at even steps, and what to count their scatter in: their standard errors,
+        or their own size.
+
+    Examples
+    --------
+    >>> lobe = np.exp(-np.linspace(-3.0, 3.0, 60) ** 2)
+    >>> round(scatter_of(lobe, 0.01 * lobe), 2)
+    0.0
+    >>> noise = np.random.default_rng(0).standard_normal(60)
+    >>> bool(0.6 < scatter_of(lobe * (1.0 + 0.01 * noise), 0.01 * lobe) < 1.3)
+    True
+    """
+    # Readings this far below the brightest are no light
+    lit = np.flatnonzero(np.abs(values) > 1e-12 * np.abs(values).max(initial=0.0))
+    if lit.size:
+        values, unit = (part[lit[0] : lit[-1] + 1] for part in (values, unit))
+    if values.size < 12 or not (unit > 0.0).all():
         return float("nan")
-    return float(np.median(np.abs(np.diff(values, n=2)))) / (_SECOND * _MEDIAN)
+    found = [_in_differences(values, unit, order) for order in (2, 3, 4)]
+    if (values > 0.0).all():
+        logs, parts = np.log(values), np.minimum(unit / values, 1e100)
+        found += [_in_differences(logs, parts, order) for order in (2, 3, 4)]
+    return min(found)
+
+
+def _in_differences(values: np.ndarray, unit: np.ndarray, order: int) -> float:
+    """Return the scatter that differences of one order see."""
+    weights = np.array([comb(order, k) ** 2 for k in range(order + 1)], dtype=float)
+    spread = np.sqrt(np.convolve(unit**2, weights, mode="valid"))
+    # Readings so dark that their square is nothing tell nothing
+    seen = spread > 0.0
+    if not seen.any():
+        return float("nan")
+    size = np.abs(np.diff(values, n=order))[seen] / spread[seen]
+    return float(np.median(size)) / _MEDIAN

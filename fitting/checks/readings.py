@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fitting.checks.curves import READ_BACK, Curve, brightness, noise_of, together
+from fitting.checks.curves import READ_BACK, Curve, brightness, scatter_of, together
 from fitting.checks.finding import Finding
 
 if TYPE_CHECKING:
@@ -16,6 +16,10 @@ __all__ = [
 ]  # fmt: skip
 
 _REPEATS = 3
+# Darker than any reading [1/sr]
+_LEAST = 1e-150
+# Below this albedo no diffuse base is as level as a floor
+_NO_BASE = 2e-3
 
 
 def check_limits(curves: Sequence[Curve]) -> list[Finding]:
@@ -33,24 +37,7 @@ def check_limits(curves: Sequence[Curve]) -> list[Finding]:
                 "fitting.readings.masks, or empty cells.",
             )
         )  # fmt: skip
-    # Far below the peak: a diffuse sample has flat wings too
-    floors = [
-        curve
-        for curve in curves
-        if _repeated(curve, np.min) and curve.value.min() < 0.05 * curve.value.max()
-    ]
-    if floors:
-        curve = floors[0]
-        bottom = curve.value.min()
-        what = "exactly 0" if bottom == 0 else f"the lowest value, {bottom:.6g}"
-        findings.append(
-            Finding(
-                name="floor", severity="warning",
-                what=f"{_repeated(curve, np.min)} readings have {what}, at {curve.place}",
-                suspects="the floor of the instrument, or places that were not measured",
-                cure="Leave these cells empty; exact zeros are left out by the commands.",
-            )
-        )  # fmt: skip
+    findings += _floor(curves)
     values = np.concatenate([curve.value for curve in curves])
     negative = int((values < 0).sum())
     if negative:
@@ -62,6 +49,54 @@ def check_limits(curves: Sequence[Curve]) -> list[Finding]:
             )
         )  # fmt: skip
     return findings
+
+
+def _floor(curves: Sequence[Curve]) -> list[Finding]:
+    """Look for the lowest value several times, far below the peak.
+
+    Wings of a diffuse base are level too. They are told from a floor by their level, or
+    where a lobe bends down into one as it does in a floor alone.
+    """
+    floors = [
+        curve
+        for curve in curves
+        if _repeated(curve, np.min) and curve.value.min() < 0.05 * curve.value.max()
+    ]
+    if not floors:
+        return []
+    sure = [curve for curve in floors if _is_cut_off(curve)]
+    curve = (sure or floors)[0]
+    bottom = curve.value.min()
+    what = "exactly 0" if bottom == 0 else f"the lowest value, {bottom:.6g}"
+    found = Finding(
+        name="floor", severity="warning" if sure else "note",
+        what=f"{_repeated(curve, np.min)} readings have {what}, at {curve.place}",
+        suspects="the floor of the instrument, or places that were not measured"
+        if sure else "a diffuse base, or the floor of the instrument",
+        cure="Leave these cells empty; exact zeros are left out by the commands."
+        if sure else "Leave the cells of a floor empty.",
+    )  # fmt: skip
+    return [found]
+
+
+def _is_cut_off(curve: Curve) -> bool:
+    """Tell whether the lowest value is no light, or less than any base, or cuts a lobe."""
+    bottom = float(curve.value.min())
+    if bottom * np.pi < _NO_BASE:
+        return True
+    _, value, _ = curve.in_plane()
+    for side in (value, value[::-1]):
+        level = np.flatnonzero(side == bottom)
+        peak = int(np.argmax(side))
+        inner = level[level < peak]
+        flank = side[inner[-1] + 1 : peak] if inner.size else side[:0]
+        if flank.size < 4:
+            continue
+        # Beside a base the flank flattens, beside a floor it falls ever faster
+        bend = np.diff(np.log(flank[:4]), n=2)
+        if (bend < 0.0).all():
+            return True
+    return False
 
 
 def _is_clipped(curve: Curve) -> bool:
@@ -82,36 +117,36 @@ def _repeated(curve: Curve, extreme: Callable[[np.ndarray], float]) -> int:
 
 def check_noise(curves: Sequence[Curve]) -> list[Finding]:
     """Compare the scatter about a smooth curve with the stated errors."""
-    scatter, stated, level = [], [], []
+    beside, parts, stated = [], [], []
     for curve in curves:
         view, value, stderr = curve.in_plane()
         steps = np.diff(view)
         if view.size < 12 or np.ptp(steps) > 0.05 * steps.mean():
             continue
-        # Only where the curve is flat do second differences see noise alone
-        scatter.append(noise_of(value[value <= np.median(value)]))
-        stated.append(float(np.median(stderr[value <= np.median(value)])))
-        level.append(float(np.median(value)))
-    if not scatter or not np.median(level) > 0:
+        beside.append(scatter_of(value, stderr))
+        stated.append(float(np.median(stderr)))
+        parts.append(scatter_of(value, np.maximum(np.abs(value), _LEAST)))
+    if np.isfinite(beside).any():
+        ratio = float(np.nanmedian(beside))
+        error = float(np.nanmedian(stated))
+        if ratio > 3.0:
+            return [
+                Finding(
+                    name="noise", severity="warning",
+                    what=f"neighbouring readings scatter by {ratio:.3g} times the stated "
+                    f"errors (median {error:.3g} 1/sr)",
+                    suspects="errors of the mean where those of a reading are meant, or "
+                    "drift",
+                    cure="Let the fit estimate the noise: leave the column of errors out.",
+                )
+            ]  # fmt: skip
+    if not np.isfinite(parts).any():
         return []
-    noise, error, middle = (float(np.median(part)) for part in (scatter, stated, level))
-    if not np.isfinite(noise):
-        return []
-    if np.isfinite(error) and error > 0 and noise > 3.0 * error:
-        return [
-            Finding(
-                name="noise", severity="warning",
-                what=f"neighbouring readings scatter by {noise:.3g} 1/sr, "
-                f"{noise / error:.3g} times the stated errors",
-                suspects="errors of the mean where those of a reading are meant, or drift",
-                cure="Let the fit estimate the noise: leave the column of errors out.",
-            )
-        ]  # fmt: skip
     return [
         Finding(
             name="noise", severity="note",
-            what=f"neighbouring readings scatter by at most {noise / middle:.2g} of the "
-            "middle of each curve",
+            what="neighbouring readings scatter by about "
+            f"{float(np.nanmedian(parts)):.2g} of themselves",
         )
     ]  # fmt: skip
 

@@ -324,5 +324,7 @@ def _first_stderr(
     m00 = np.abs(observations.m00)
     read = np.isfinite(m00).any()
     typical = np.nanmedian(m00) if read else float(np.median(np.abs(predicted)))
+    # Of a lobe on black most readings are 0
+    typical = max(typical, 1e-6 * float(np.nanmax(m00)) if read else 0.0, 1e-200)
     m00 = np.where(m00 > 0.0, m00, typical)
     return weights.shape(np.maximum(m00, 1e-3 * typical))

@@ -41,6 +41,10 @@ _ROUNDS = 25
 _UNDAMPED = 4
 
 
+# Far from a minimum numbers may be too large: the cost of such a step refuses it
+_far_away = np.errstate(over="ignore", invalid="ignore", divide="ignore")
+
+
 @dataclass(frozen=True, eq=False)
 class Solved:
     """A solution with the standard errors of the readings it was found under.
@@ -150,6 +154,7 @@ class Problem:
         objective = self.objective.with_parameters(held)
         return replace(self, parameters=held, objective=objective, search=None)
 
+    @_far_away
     def solve(
         self, *, rounds: int = _ROUNDS, after: "Solved | None" = None, near: bool = False
     ) -> Solved:
@@ -193,6 +198,7 @@ class Problem:
         solution = replace(solution, n_evaluations=count, cost=objective.cost(solution.x))
         return Solved(solution, objective, _log_likelihood(objective, solution.x))
 
+    @_far_away
     def minimise(self, *, begin: np.ndarray) -> Solution:
         """Fit once from `begin`, with the standard errors of the readings as they are."""
         return self._refine(self.objective.started_at(begin))

@@ -56,7 +56,8 @@ def descend(
             (x >= objective.high) & (gradient < 0.0)
         )
         free = ~pressed & (unit > 0.0)
-        if not free.any() or not np.isfinite(curvature).all():
+        finite = np.isfinite(curvature).all() and np.isfinite(gradient).all()
+        if not free.any() or not finite:
             break
         while damping < _STUCK:
             damped = curvature[np.ix_(free, free)] + damping * np.eye(free.sum())

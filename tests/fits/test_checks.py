@@ -210,6 +210,35 @@ def test_limits_of_the_instrument_repeats_and_noise():
     assert "noise" not in names(noisy.assign(M00_stderr=10 * noisy.M00_stderr))
 
 
+@pytest.mark.parametrize("slope", [0.01, 0.03, 0.1, 0.25])
+@pytest.mark.parametrize("step", [1, 2.5, 5])
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_narrow_lobes_and_diffuse_wings_are_no_noise_and_no_floor(slope, step, noise):
+    rng = np.random.default_rng(5)
+    for albedo in (0.0, 0.05, 0.4):
+        model = MicrofacetModel(Material(1.5), slope_rms=slope, diffuse_albedo=albedo)
+        scan = scan_of(model, views=np.arange(-75, 76, step))[["M00"]]
+        values = scan.M00 * (1.0 + noise * rng.standard_normal(scan.M00.size))
+        stderr = 0.02 * scan.M00 + 1e-12 * float(scan.M00.max())
+        scan = scan.assign(M00=values, M00_stderr=stderr)
+        assert "noise" not in names(scan)
+        if albedo:
+            assert "floor" not in names(scan)
+            loud = scan.M00 * (1.0 + 0.3 * rng.standard_normal(scan.M00.size))
+            assert "noise" in names(scan.assign(M00=loud.clip(min=1e-9)))
+
+
+@pytest.mark.parametrize("level", [1e-4, 0.02])
+def test_a_lobe_that_is_cut_off_ends_in_a_floor(level):
+    model = MicrofacetModel(Material(1.5), slope_rms=0.12)
+    scan = scan_of(model, views=np.arange(-75, 76, 1.0))[["M00"]]
+    assert "floor" in names(scan.assign(M00=scan.M00.clip(min=level * scan.M00.max())))
+    # The same level as a base that shines through
+    assert "floor" not in names(
+        scan.assign(M00=(scan.M00 + 0.02 * scan.M00.max()).round(4))
+    )
+
+
 def test_a_weak_dolp_is_said_to_be_lifted_by_noise():
     scan = scan_of().drop_vars("M10")
     rng = np.random.default_rng(8)
