@@ -119,6 +119,8 @@ class Sight:
         Facets that joined the cones, points tried, seen, left aside.
     bundles : int
         Bundles sent.
+    notes : tuple of str
+        Warnings of what was laid on the surface.
     """
 
     brdf: np.ndarray
@@ -131,6 +133,7 @@ class Sight:
     counts: np.ndarray
     facet_counts: np.ndarray
     bundles: int
+    notes: tuple[str, ...] = ()
 
 
 @dataclass

@@ -54,6 +54,8 @@ class Readings:
         self.counts = np.zeros(shading.N_COUNTS, dtype=np.int64)
         self.facet_counts = np.zeros(observe_facets.N_FACET_COUNTS, dtype=np.int64)
         self.bundles = 0
+        # In the order in which they came, each once
+        self.notes: dict[str, None] = {}
 
     def add(self, sight: Sight) -> None:
         """Add one sample."""
@@ -69,6 +71,7 @@ class Readings:
         self.counts += sight.counts
         self.facet_counts += sight.facet_counts
         self.bundles += sight.bundles
+        self.notes |= dict.fromkeys(sight.notes)
 
     @property
     def mean(self) -> np.ndarray:

@@ -28,6 +28,7 @@ from pbrdf.surface import (
 )
 from pbrdf.tracer import arguments
 from pbrdf.tracer.asked import Run
+from pbrdf.tracer.media import covering_materials, opaque_drop_notes
 from pbrdf.validity import attach, lost_light_warnings, lost_ray_warnings
 
 __all__ = ["ESTIMATORS", "as_scan", "observe"]
@@ -38,6 +39,7 @@ ESTIMATORS = {
     "corners": "bundles of rays, weighted with what their cone shares with the source",
     "count": "rays that meet the cone of the source, counted; for comparison",
 }
+COUNT = "count"
 # From this half-angle in rms slopes on, a cone is no longer small against the lobe of the
 # surface: F' errs by 0.4 %, corner rays lose 4 % of the light of two bounces
 # (studies/two_ways)
@@ -132,7 +134,8 @@ def observe(  # noqa: PLR0913  (the public signature)
     way.
 
     - "count" traces rays from the detector and counts those that meet the cone of the
-      source. It is unbiased and slow.
+      source. It is unbiased and slow. Through drops, spheres, films and transparent solids
+      of a mesh it is the only one, and rays start at the source.
     - "corners" lets each ray stand for the whole cone: flat facets mirror cones rigidly,
       so the solid angle is conserved, and the share of the mirrored cone that lies in the
       source takes the place of hit or miss. It takes all directions of the cone to meet
@@ -172,6 +175,7 @@ def observe(  # noqa: PLR0913  (the public signature)
     source = _half_angle("source_half_angle", source_half_angle, angles[0])
     detector = _half_angle("detector_half_angle", detector_half_angle, angles[1])
     widest, slope = max(source, detector), _rms_slope(scene.surface)
+    through = _goes_through(scene, estimator)
     look = Look(
         theta_i=angles[0],
         theta_s=angles[1],
@@ -182,9 +186,10 @@ def observe(  # noqa: PLR0913  (the public signature)
         n_rays=run.rays_of_sample,
         max_bounces=arguments.count("max_bounces", max_bounces, 1),
         estimator=arguments.one_of("estimator", estimator, ESTIMATORS),
-        counts=estimator == "count"
+        counts=estimator == COUNT
         or (estimator != "corners" and widest > NARROW_CONE * slope > 0.0),
-        from_source=arguments.one_of("start", start, ("detector", "source")) == "source",
+        from_source=arguments.one_of("start", start, ("detector", "source")) == "source"
+        or through,
         hemisphere_samples=arguments.in_range(
             "hemisphere_samples", hemisphere_samples, 0.1, 1e4, "2 is a good start."
         ),
@@ -199,12 +204,15 @@ def observe(  # noqa: PLR0913  (the public signature)
     check_memory(run, look)
     _check_growth(look.hemisphere_samples, look.sample_decay)
     judged = run.judged(angles[0], run.waves)
-    early = [*judged.notes, *_wide_cones(estimator, widest, slope)]
+    early = [
+        *judged.notes, *opaque_drop_notes(scene.contaminants, run.waves),
+        *_wide_cones(estimator, widest, slope),
+    ]  # fmt: skip
     _warn(early)
     seen = look_at_samples(run, look)
-    late = lost_ray_warnings(int(seen.counts[N_LEAKED]), seen.bundles)
-    fates = ("left_sideways",) if late else ("leaked", "left_sideways")
-    late += _missing_light(seen, fates)
+    lost = lost_ray_warnings(int(seen.counts[N_LEAKED]), seen.bundles)
+    fates = ("left_sideways",) if lost else ("leaked", "left_sideways")
+    late = [*seen.notes, *lost, *_missing_light(seen, fates)]
     cut = _missing_light(seen, ("truncated",))
     # Told in any case, but no surprise to one who set a low limit
     _warn([*late, *(cut if look.max_bounces >= MOST_BOUNCES else ())])
@@ -214,7 +222,7 @@ def observe(  # noqa: PLR0913  (the public signature)
         attrs=run.attributes(seen.samples)
         | {
             **look.attributes(),
-            "start": start,
+            "start": "source" if look.from_source else "detector",
             "rel_error": seen.rel_error(),
             "warnings": [*early, *late, *cut, *judged.remarks],
             "version": __version__,
@@ -239,19 +247,20 @@ def _angles(
             "Give them a period, or use simulate."
         )
         raise ValueError(msg)
-    if isinstance(surface, MeshSurface) and surface.transparent:
-        msg = (
-            f"transparent must be empty to observe, got labels {surface.transparent}. Use "
-            "simulate with source_half_angle and bins as wide as the detector."
-        )
-        raise ValueError(msg)
-    if len(scene.contaminants) > 0:
-        msg = (
-            f"contaminants must be empty to observe, got {len(scene.contaminants)}. "
-            "Use simulate with source_half_angle and bins as wide as the detector."
-        )
-        raise ValueError(msg)
     return angles
+
+
+def _goes_through(scene: Scene, estimator: str) -> bool:
+    """Whether light goes through bodies of a scene; then it can only be counted."""
+    clear = bool(covering_materials(scene))
+    if clear and estimator != COUNT:
+        msg = (
+            f'estimator must be "{COUNT}" where light goes through bodies or films, got '
+            f"{estimator!r}. What they refract are no cones any more; counted rays are "
+            "noisier, so take wider cones or more rays."
+        )
+        raise ValueError(msg)
+    return clear
 
 
 def _wide_cones(estimator: str, widest: float, slope: float) -> list[str]:

@@ -6,12 +6,14 @@ import numpy as np
 
 from pbrdf.conventions import BOUNCES
 from pbrdf.memory import NODE, PROGRAM, Size, check_room
+from pbrdf.observation.beams import BeamLook
 from pbrdf.observation.look import Look, Sight
 from pbrdf.observation.one_sample import look_at
 from pbrdf.observation.readings import Readings
 from pbrdf.surface import FixedSurface, GaussianSurface, MeasuredSurface, MeshSurface
 from pbrdf.tracer.asked import Run
 from pbrdf.tracer.field import Field
+from pbrdf.tracer.media import media_of_scene
 from pbrdf.tracer.mesh_field import MeshField
 from pbrdf.tracer.schedule import MOST_SAMPLES, gather
 
@@ -52,7 +54,14 @@ def _size(look: Look) -> Size:
 def look_at_samples(run: Run, look: Look) -> Readings:
     """Look at samples until there are enough."""
     surface = run.scene.surface
-    if run.batched:
+    media = media_of_scene(run.scene, run.waves)
+    if media is not None:
+        beams = BeamLook(scene=run.scene, media=media, look=look)
+        first = run.root.spawn(1)[0]
+        draw = (
+            partial(beams.at, beams.ready(first)) if run.batched else beams.at_realization
+        )
+    elif run.batched:
         shared = (
             surface
             if isinstance(surface, FixedSurface)

@@ -10,8 +10,6 @@ import numpy.typing as npt
 import xarray as xr
 
 import pbrdf.accessor  # noqa: F401  (registers ds.pbrdf)
-from pbrdf.contaminants import Film
-from pbrdf.kernels.bodies.world import Media
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.memory import OF_SIZE, Effort, asked_size, check_run
 from pbrdf.simulation.pilot import choose
@@ -25,11 +23,7 @@ from pbrdf.simulation.waves import check_waves
 from pbrdf.surface import MeshSurface
 from pbrdf.tracer import arguments
 from pbrdf.tracer.asked import Run
-from pbrdf.tracer.media import (
-    clear_materials,
-    covering_materials,
-    media_of,
-)
+from pbrdf.tracer.media import media_of_scene
 
 # Where paths are cut: on a clean surface, and where transparent bodies may catch light
 MOST_BOUNCES, MOST_EVENTS = 64, 1024
@@ -240,7 +234,7 @@ def _plans(  # noqa: PLR0913  (arguments of `simulate`)
     """Plan the rays of each azimuth, and say whether azimuths are a dimension."""
     angles = arguments.zeniths(theta_i)
     azimuths, several = arguments.azimuths(phi_i)
-    media = _media(run)
+    media = media_of_scene(run.scene, run.waves)
     if max_bounces is None:
         max_bounces = MOST_BOUNCES if media is None else MOST_EVENTS
     allowed = chosen_skips(skips)
@@ -268,16 +262,6 @@ def _plans(  # noqa: PLR0913  (arguments of `simulate`)
         fold=arguments.mirrored(fold, run.scene, phi_i),
     )
     return [plan.at(azimuth) for azimuth in azimuths], several
-
-
-def _media(run: Run) -> Media | None:
-    """Tell what light goes through, None on a clean opaque surface."""
-    scene = run.scene
-    covering = covering_materials(scene)
-    if not covering:
-        return None
-    films = [one.material for one in scene.contaminants if isinstance(one, Film)]
-    return media_of(scene.materials, covering, run.waves, [*films, *clear_materials(scene)])
 
 
 def _counts(

@@ -10,6 +10,7 @@ from pbrdf.kernels.bodies.transparent import trace_among_bodies, trace_on_mesh
 from pbrdf.kernels.bodies.world import N_HIT
 from pbrdf.kernels.paths import shading
 from pbrdf.kernels.paths.first_bounce import N_MIRRORED, LineRoom
+from pbrdf.kernels.paths.mesh_lines import N_MET, MeshLine
 from pbrdf.kernels.paths.spectra import close_sums
 from pbrdf.kernels.paths.transport import (
     N_WAITING,
@@ -86,21 +87,23 @@ def trace_sample(
                 _room(plan, NO_MEETINGS), bins,
             )  # fmt: skip
             continue
+        longest = -(-source.n_rays // source.n_lines)
         if isinstance(field, MeshField):
+            met, told = np.empty((longest, N_MET)), np.empty(longest, dtype=np.int64)
             trace_mesh_batch(
-                field.facets(), source, record, waiting, light, plan.optics, bins
-            )
+                field.facets(), source, MeshLine(met, told), record, waiting, light,
+                plan.optics, bins,
+            )  # fmt: skip
             if tally.spectra:
                 close_sums(light, plan.n_stokes, bins.lit)
             continue
         # One pass along each line of entry points finds all first facets
         walks = not isinstance(target, EmbreeField)
         sweeps = walks and field.periodic and "sweep" in plan.skips
-        longest = -(-source.n_rays // source.n_lines) if sweeps else 0
+        swept = longest if sweeps else 0
         line = LineRoom(
-            np.empty((longest, N_FIRST)), np.empty((2, longest)),
-            np.empty(longest * N_MIRRORED),
-        )  # fmt: skip
+            np.empty((swept, N_FIRST)), np.empty((2, swept)), np.empty(swept * N_MIRRORED)
+        )
         if isinstance(target, WetField):
             trace_among_bodies(
                 target.world, source, field.terrain.z_top, plan.max_bounces,

@@ -44,6 +44,7 @@ _SIGNATURES = {
     "rtcSetGeometryInstancedScene": (None, [_HANDLE, _HANDLE]),
     "rtcSetGeometryTransform": (None, [_HANDLE, _NUMBER, _NUMBER, _HANDLE]),
     "rtcOccluded1": (None, [_HANDLE, _HANDLE, _HANDLE]),
+    "rtcIntersect8": (None, [_HANDLE, _HANDLE, _HANDLE, _HANDLE]),
     "rtcCommitGeometry": (None, [_HANDLE]),
     "rtcAttachGeometry": (_NUMBER, [_HANDLE, _HANDLE]),
     "rtcReleaseGeometry": (None, [_HANDLE]),

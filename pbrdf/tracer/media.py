@@ -7,6 +7,7 @@ import numpy as np
 
 from pbrdf.contaminants.arguments import material_of
 from pbrdf.contaminants.drops import Drops
+from pbrdf.contaminants.films import Film
 from pbrdf.kernels.bodies.media import DEEP
 from pbrdf.kernels.bodies.world import Media
 from pbrdf.kernels.optics.absorbing import shares_into_absorber
@@ -36,6 +37,15 @@ def covering_materials(scene: Scene) -> list[Material]:
     """
     lying = [material_of(one.material) for one in scene.contaminants]
     return _each_once([*clear_materials(scene), *lying])
+
+
+def media_of_scene(scene: Scene, waves: np.ndarray | None) -> Media | None:
+    """Tell what light goes through in a scene, None on a clean opaque surface."""
+    covering = covering_materials(scene)
+    if not covering:
+        return None
+    films = [one.material for one in scene.contaminants if isinstance(one, Film)]
+    return media_of(scene.materials, covering, waves, [*films, *clear_materials(scene)])
 
 
 def _each_once(given: Iterable[Material]) -> list[Material]:

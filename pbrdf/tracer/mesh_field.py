@@ -12,6 +12,7 @@ import numpy as np
 
 from pbrdf.kernels import compiled_callback
 from pbrdf.kernels.meshes import facets as kernel
+from pbrdf.kernels.meshes.packets import LANES, Packet
 from pbrdf.kernels.meshes.search import (
     AT_ADDRESSES,
     AT_QUERY,
@@ -58,6 +59,7 @@ RAY_BYTES, ARGUMENTS_BYTES = 4 * N_WORDS, 64
 CONTEXT_BYTES = AT_ADDRESSES + 8 * N_ADDRESSES
 # Numbers of RTCIntersectArguments: call back for every facet; all features
 INVOKE_FILTER, ALL_FEATURES, NO_INSTANCE = 1 << 1, 0xFFFFFFFF, 0xFFFFFFFF
+PACKET_BYTES = 4 * N_WORDS * LANES
 
 
 @functools.cache
@@ -69,6 +71,22 @@ def judge_address() -> int:
     """Address of the call back that judges candidates, compiled once and kept."""
     with _JUDGE_LOCK:
         return int(_compiled_judge().address)
+
+
+def packet_room(context: int) -> Packet:
+    """Room for a packet of rays, with the context of a query at this address."""
+    memory = np.zeros(PACKET_BYTES + 2 * ALIGNMENT + ALIGNMENT, np.uint8)
+    memory = memory[-memory.ctypes.data % ALIGNMENT :]
+    rays, arguments = memory[:PACKET_BYTES], memory[PACKET_BYTES:][:ALIGNMENT]
+    valid = memory[PACKET_BYTES + ALIGNMENT :][: 4 * LANES].view(np.int32)
+    arguments[4:8].view(np.uint32)[:] = ALL_FEATURES
+    arguments[8:16].view(np.int64)[:] = context
+    call = ctypes.cast(library().rtcIntersect8, ctypes.c_void_p).value
+    return Packet(
+        call, valid.ctypes.data, rays.ctypes.data, arguments.ctypes.data,
+        arguments[:4].view(np.uint32), rays.view(np.float32), rays.view(np.uint32), valid,
+        np.zeros(LANES, dtype=np.int64), np.zeros(1, dtype=np.int64),
+    )  # fmt: skip
 
 
 def free_slope(surface: MeshSurface) -> float:
@@ -164,7 +182,9 @@ class MeshField:
             tolerance=TOLERANCE * unit,
         )
         vertices = ((surface.vertices - center) / unit).astype(np.float32)
-        flags = SCENE_ROBUST | SCENE_ASKS_BACK
+        # A ray that slips through a closed mesh meets a back next, and is traced again
+        quick = surface.kind != "sheet" and surface.parts == 1 and not surface.transparent
+        flags = SCENE_ASKS_BACK | (0 if quick else SCENE_ROBUST)
         scene = build_tree(vertices, surface.faces, flags)
         if surface.period is not None:
             tree, scene = scene, build_images(scene, images / unit, flags)
@@ -243,6 +263,7 @@ class MeshField:
         context[:8].view(np.uint32)[:] = NO_INSTANCE
         labels = NO_LABELS if surface.labels is None else surface.labels
         solids = NO_SOLIDS if surface.solids is None else surface.solids
+        packet = packet_room(context.ctypes.data)
         context[AT_ADDRESSES:].view(np.int64)[:] = [
             array.ctypes.data if array.size else 0
             for array in (
@@ -258,5 +279,5 @@ class MeshField:
             within, first, any_one, self.scene, ray.ctypes.data, arguments.ctypes.data, ray,
             ray.view(np.uint32), self.images,
             context[AT_QUERY : AT_QUERY + 8 * N_QUERY].view(np.float64),
-            np.zeros(1, dtype=np.int64),
+            np.zeros(1, dtype=np.int64), packet,
         )  # fmt: skip

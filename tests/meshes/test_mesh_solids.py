@@ -242,7 +242,7 @@ def test_scene_files_keep_what_is_transparent(tmp_path):
                 Scene(MeshSurface(layer(1, 0), (10, 8), transparent=True), Material(1.5)),
                 0.2, 0.3, 0.0,
             ),
-            "transparent must be empty to observe",
+            'estimator must be "count" where light goes through',
         ),
     ],
 )  # fmt: skip

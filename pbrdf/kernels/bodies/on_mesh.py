@@ -36,6 +36,7 @@ from pbrdf.kernels.bodies.world import (
     SOLID_OUT,
 )
 from pbrdf.kernels.meshes.facets import facet_normal, facet_solid
+from pbrdf.kernels.meshes.packets import UNTOLD
 from pbrdf.kernels.meshes.seek import follow_ray
 from pbrdf.kernels.meshes.shots import BELOW
 from pbrdf.kernels.terrain.heightfield import ESCAPED, HIT, SIDE
@@ -68,7 +69,7 @@ def next_on_mesh(mesh, state, top, kind, hit):
         z = mesh.frame.z_top
     count_solids(mesh, state, top, 1)
     fate, face, delicate, x, y, z, way = follow_ray(
-        mesh, mesh.within, face, delicate, x, y, z, k_x, k_y, k_z
+        mesh, mesh.within, UNTOLD, face, delicate, x, y, z, k_x, k_y, k_z
     )
     count_solids(mesh, state, top, -1)
     way += ahead

@@ -6,7 +6,6 @@ the top of the stack is followed to its end, then those below it.
 """
 
 from pbrdf.kernels import jit
-from pbrdf.kernels.bins.binning import bin_of_direction
 from pbrdf.kernels.bodies.beams import (
     EVENTS,
     FACET,
@@ -25,13 +24,9 @@ from pbrdf.kernels.bodies.beams import (
     Z,
 )
 from pbrdf.kernels.bodies.bodies import HIT_T
+from pbrdf.kernels.bodies.detectors import detect, turn_cones
 from pbrdf.kernels.bodies.events import first_event, move_beam, next_event
-from pbrdf.kernels.bodies.interfaces import (
-    axis_of_beam,
-    set_axis,
-    turn_columns,
-    way_of_beam,
-)
+from pbrdf.kernels.bodies.interfaces import set_axis
 from pbrdf.kernels.bodies.media import solid_at
 from pbrdf.kernels.bodies.splitting import (
     CROWDED,
@@ -41,7 +36,6 @@ from pbrdf.kernels.bodies.splitting import (
     survives,
 )
 from pbrdf.kernels.bodies.world import ASIDE, ASTRAY, CONFORMAL, OUT, PASSED
-from pbrdf.kernels.optics.frames import exit_turn
 from pbrdf.kernels.paths.random import Draw
 from pbrdf.kernels.paths.shading import (
     LEAKED,
@@ -66,22 +60,11 @@ MAX_STEPS = 10_000_000  # of one ray with all its parts
 
 @jit(forceinline=True)
 def deposit(state, top, columns, w, beam, tally):
-    """Add the matrix of a beam that leaves the scene to its bin."""
-    k = way_of_beam(state, top)
-    c2, s2 = exit_turn(k, axis_of_beam(state, top), beam.cos_phi, beam.sin_phi)
-    turn_columns(state, top, columns, c2, s2)
-    i_theta, i_dphi = bin_of_direction(
-        k.x, k.y, k.z, beam.cos_phi, beam.sin_phi, tally.zenith, tally.azimuth
-    )
+    """Count a beam that leaves the scene, and add its matrix to its bin or its cones."""
     order = int(min(state[top, EVENTS], tally.flux.shape[1])) - 1
     tally.counts[N_ESCAPED] += 1
     tally.counts[N_ORDERS + order] += 1
-    tally.lit[order, i_theta, i_dphi] = True
-    for row in range(columns):
-        for column in range(columns):
-            tally.flux[w, order, i_theta, i_dphi, row, column] += state[
-                top, MUELLER + 4 * row + column
-            ]
+    detect(state, top, columns, w, order, beam, tally, tally.cones)
 
 
 @jit(forceinline=True)
@@ -197,6 +180,7 @@ def trace_among_bodies(world, source, z_start, max_events, columns, room, tally)
         beam, first, rays, points = rays_of_line(
             line, source, terrain.pitch_x, terrain.pitch_y
         )
+        turn_cones(tally.cones, beam)
         if room.meetings.size > 0:
             lift = world.film.height if world.film.kind == CONFORMAL else 0.0
             sweep_line(terrain, line, source, z_start - lift, room.meetings)
@@ -224,6 +208,7 @@ def trace_on_mesh(world, source, z_top, max_events, columns, room, tally):
     tally.counts[N_EXACT] -= world.mesh.searches[0]
     for line in range(source.n_lines):
         beam, first, rays, points = rays_of_line(line, source, 1.0, 1.0)
+        turn_cones(tally.cones, beam)
         k = way_of(beam)
         before = margin / beam.cos_t
         for ray in range(rays):

@@ -28,11 +28,12 @@ MeshFrame = namedtuple(
 # Embree: addresses of `rtcIntersect1`, of
 # `rtcOccluded1`, of the scene, of a ray and of the arguments of an exact search; the ray as
 # float32 and uint32, the periods that each image is moved by (images, 2), and what the
-# search asks and finds (N_QUERY,) and how often it ran (1,)
+# search asks and finds (N_QUERY,), how often it ran (1,), and room for a
+# `pbrdf.kernels.meshes.packets.Packet`
 Facets = namedtuple(
     "Facets",
     "corners faces normals labels solids frame media within intersect occluded scene place "
-    "arguments ray words images query searches",
+    "arguments ray words images query searches packet",
 )
 
 

@@ -63,3 +63,17 @@ def call_embree(typing_context, function, scene, ray, arguments):
         return context.get_dummy_value()
 
     return types.void(types.intp, types.intp, types.intp, types.intp), generate
+
+
+@intrinsic
+def call_embree_packet(typing_context, function, valid, scene, rays, arguments):
+    """Call the C function (valid, scene, rays, arguments) at an address; all addresses."""
+
+    def generate(context, builder, signature, given):
+        pointer = ir.IntType(8).as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [pointer, pointer, pointer, pointer])
+        target = builder.inttoptr(given[0], kind.as_pointer())
+        builder.call(target, [builder.inttoptr(one, pointer) for one in given[1:]])
+        return context.get_dummy_value()
+
+    return types.void(*[types.intp] * 5), generate

@@ -21,7 +21,15 @@ from pbrdf.kernels.meshes.facets import (
     facet_normal,
     place_on_facet,
 )
-from pbrdf.kernels.meshes.shots import BELOW, WRONG, ask_embree, is_delicate, search
+from pbrdf.kernels.meshes.packets import UNTOLD, put_ray
+from pbrdf.kernels.meshes.shots import (
+    BELOW,
+    WRONG,
+    ask_embree,
+    is_delicate,
+    lifted,
+    search,
+)
 from pbrdf.kernels.meshes.sides import ask_either, is_caught, is_delicate_behind
 from pbrdf.kernels.terrain.heightfield import ESCAPED, HIT, LOST, SIDE
 
@@ -50,11 +58,11 @@ def end_of_way(mesh, face, image, x, y, z):
 
 
 @jit(forceinline=True)
-def ask(mesh, within, face, x, y, z, k_x, k_y, k_z, t_end, delicate):
+def ask(mesh, within, face, x, y, z, k_x, k_y, k_z, t_end, delicate, told):
     """Find the next facet that lies no further than t_end."""
     answer = (ESCAPED, -1, 0, t_end)
     if within is None:
-        answer = ask_embree(mesh, face, x, y, z, k_x, k_y, k_z, t_end, delicate)
+        answer = ask_embree(mesh, face, x, y, z, k_x, k_y, k_z, t_end, delicate, told)
     if within is not None:
         answer = ask_either(mesh, within, face, x, y, z, k_x, k_y, k_z, t_end, delicate)
     return answer
@@ -84,33 +92,60 @@ def may_mislead(mesh, within, face, x, y, z, k_x, k_y, k_z, before):
 @jit(allocates=False)
 def seek_facet(mesh, face, delicate, x, y, z, k_x, k_y, k_z):
     """Follow a ray that never enters a solid: (fate, facet, delicate, x, y, z)."""
+    return seek_told(mesh, UNTOLD, face, delicate, x, y, z, k_x, k_y, k_z)
+
+
+@jit(forceinline=True)
+def seek_told(mesh, told, face, delicate, x, y, z, k_x, k_y, k_z):
+    """`seek_facet` of a ray of which a packet may have told what Embree finds first."""
     fate, face, delicate, x, y, z, _ = follow_ray(
-        mesh, None, face, delicate, x, y, z, k_x, k_y, k_z
+        mesh, None, told, face, delicate, x, y, z, k_x, k_y, k_z
     )
     return fate, face, delicate, x, y, z
 
 
+@jit(forceinline=True)
+def times_to_sides(frame, x, y, z, k_x, k_y, k_z):
+    """Say when a ray leaves the box of images or its heights, and when its heights."""
+    t_x = time_to_side(x, k_x, frame.low_x, frame.high_x)
+    t_y = time_to_side(y, k_y, frame.low_y, frame.high_y)
+    t_z = time_to_side(z, k_z, frame.z_bottom, frame.z_top)
+    return max(min(t_x, t_y, t_z), 0.0), t_z
+
+
+@jit(forceinline=True)
+def rises_off(frame, face, k_x, k_y, k_z):
+    """Whether a ray leaves a facet more steeply than any facet rises."""
+    free = frame.free_slope
+    return face >= 0 and k_z > 0.0 and k_z * k_z >= free * free * (k_x * k_x + k_y * k_y)
+
+
+@jit(forceinline=True)
+def foresee(mesh, member, face, x, y, z, k_x, k_y, k_z, told):
+    """Put a ray into the packet, as `seek_told` would have it shot."""
+    t_end, _ = times_to_sides(mesh.frame, x, y, z, k_x, k_y, k_z)
+    x, y, z = lifted(mesh, face, x, y, z)
+    put_ray(mesh, member, x, y, z, k_x, k_y, k_z, t_end + mesh.frame.lift, told)
+
+
 @jit(allocates=False, forceinline=True)
-def follow_ray(mesh, within, face, delicate, x, y, z, k_x, k_y, k_z):
+def follow_ray(mesh, within, told, face, delicate, x, y, z, k_x, k_y, k_z):
     """Follow a ray along the unit vector k to its end.
 
     Returns (fate, facet, delicate, x, y, z) there, and its way [um]. It starts on a facet,
     or in free space where that is -1. `delicate` is 1 at a place on a facet near which
-    another crosses it, else 0.
+    another crosses it, else 0. `told` is what a packet has told, or UNTOLD.
     """
     frame = mesh.frame
     way = 0.0
-    free = frame.free_slope
-    if face >= 0 and k_z > 0.0 and k_z * k_z >= free * free * (k_x * k_x + k_y * k_y):
+    if rises_off(frame, face, k_x, k_y, k_z):
         return ESCAPED, -1, 0, x, y, z, way
     for _ in range(MAX_PERIODS):
-        t_x = time_to_side(x, k_x, frame.low_x, frame.high_x)
-        t_y = time_to_side(y, k_y, frame.low_y, frame.high_y)
-        t_z = time_to_side(z, k_z, frame.z_bottom, frame.z_top)
-        t_end = max(min(t_x, t_y, t_z), 0.0)
+        t_end, t_z = times_to_sides(frame, x, y, z, k_x, k_y, k_z)
         fate, found, image, time = ask(
-            mesh, within, face, x, y, z, k_x, k_y, k_z, t_end + frame.lift, delicate
+            mesh, within, face, x, y, z, k_x, k_y, k_z, t_end + frame.lift, delicate, told
         )
+        told = UNTOLD
         is_out = t_z <= t_end or not frame.periodic
         falls = t_z <= t_end and k_z < 0.0
         if fate == ESCAPED and not may_leave(mesh, within, falls, is_out):

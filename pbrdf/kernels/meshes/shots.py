@@ -5,6 +5,7 @@ import math
 from pbrdf.kernels import jit
 from pbrdf.kernels.meshes.facets import facet_normal, image_of, plane_time
 from pbrdf.kernels.meshes.memory import call_embree
+from pbrdf.kernels.meshes.packets import MISSES, UNTOLD, face_and_image, told_hit
 from pbrdf.kernels.meshes.search import (
     Q_BACK,
     Q_FACE,
@@ -142,21 +143,39 @@ def search(mesh, face, x, y, z, k_x, k_y, k_z, t_end, delicate):
 
 
 @jit(forceinline=True)
-def ask_embree(mesh, face, x, y, z, k_x, k_y, k_z, t_end, delicate):
-    """Find the next facet, as `search`, which it leaves what may mislead float32."""
-    if delicate:
-        return search(mesh, face, x, y, z, k_x, k_y, k_z, t_end, 1)
-    lift_x = lift_y = lift_z = 0.0
+def lifted(mesh, face, x, y, z):
+    """Lift a place on a facet off it, and leave one in free space where it is."""
     if face >= 0:
         n_x, n_y, n_z = facet_normal(mesh, face)
-        lift_x, lift_y, lift_z = (
-            mesh.frame.lift * n_x, mesh.frame.lift * n_y, mesh.frame.lift * n_z,
-        )  # fmt: skip
-    shoot(mesh, x + lift_x, y + lift_y, z + lift_z, k_x, k_y, k_z, 0.0, t_end, 0)
+        lift = mesh.frame.lift
+        return x + lift * n_x, y + lift * n_y, z + lift * n_z
+    return x, y, z
+
+
+@jit(forceinline=True)
+def told_by_shot(mesh, face, x, y, z, k_x, k_y, k_z, t_end):
+    """Shoot one ray: what it meets, as `pbrdf.kernels.meshes.packets` tells it."""
+    x, y, z = lifted(mesh, face, x, y, z)
+    shoot(mesh, x, y, z, k_x, k_y, k_z, 0.0, t_end, 0)
     words = mesh.words
     if words[GEOMETRY] == NOTHING:
+        return MISSES
+    return told_hit(mesh, int(words[FACE]), image_of(words[INSTANCE]))
+
+
+@jit(forceinline=True)
+def ask_embree(mesh, face, x, y, z, k_x, k_y, k_z, t_end, delicate, told):
+    """Find the next facet, as `search`, which it leaves what may mislead float32.
+
+    `told` is what a packet has told of the ray, or UNTOLD.
+    """
+    if delicate:
+        return search(mesh, face, x, y, z, k_x, k_y, k_z, t_end, 1)
+    if told == UNTOLD:
+        told = told_by_shot(mesh, face, x, y, z, k_x, k_y, k_z, t_end)
+    if told == MISSES:
         return ESCAPED, -1, 0, t_end
-    found, image = int(words[FACE]), image_of(words[INSTANCE])
+    found, image = face_and_image(mesh, told)
     time, rate = plane_time(
         mesh, found, mesh.images[image, 0], mesh.images[image, 1], x, y, z, k_x, k_y, k_z
     )

@@ -7,7 +7,8 @@ from collections import namedtuple
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.meshes.facets import facet_label, facet_normal
-from pbrdf.kernels.meshes.seek import seek_facet
+from pbrdf.kernels.meshes.packets import UNTOLD
+from pbrdf.kernels.meshes.seek import seek_told
 from pbrdf.kernels.optics.vectors import Vec
 from pbrdf.kernels.paths.ray_bounce import normal_of_slopes
 from pbrdf.kernels.terrain.embree import seek
@@ -17,7 +18,7 @@ from pbrdf.kernels.terrain.sweep import F_FACET, F_I, F_J, F_U, F_V, F_Z, N_FIRS
 MAX_STEPS = 10_000_000
 
 # Where a ray is: cell, facet and place (u, v) in the cell at a height z; on a mesh facet
-# and place [um], i being 1 where the place is delicate, as `seek_facet` says
+# and place [um], i being 1 where the place is delicate, as `seek_told` says
 Place = namedtuple("Place", "i j facet u v z")
 # Tables of rays and hits begin with the columns of what `sweep_line` finds
 N_PLACE = N_FIRST
@@ -55,12 +56,15 @@ def next_on_terrain(terrain, tree, place, k, leave_rate):
 
 
 @jit(forceinline=True)
-def next_facet(terrain, tree, mesh, place, k, leave_rate):
-    """Follow a ray from a facet to the next: its fate, and its place there."""
+def next_facet(terrain, tree, mesh, place, k, leave_rate, told=UNTOLD):
+    """Follow a ray from a facet to the next: its fate, and its place there.
+
+    On a mesh a packet may have told what it meets.
+    """
     fate = LOST
     i, j, facet, u, v, z = place
     if mesh is not None:
-        fate, facet, i, u, v, z = seek_facet(mesh, facet, i, u, v, z, k.x, k.y, k.z)
+        fate, facet, i, u, v, z = seek_told(mesh, told, facet, i, u, v, z, k.x, k.y, k.z)
     if terrain is not None:
         fate, i, j, facet, u, v, z = next_on_terrain(terrain, tree, place, k, leave_rate)
     return fate, Place(i, j, facet, u, v, z)
@@ -82,11 +86,12 @@ def first_facet(terrain, tree, i, j, u, v, k):
 
 
 @jit(forceinline=True)
-def first_on_mesh(mesh, x, y, before, k):
+def first_on_mesh(mesh, x, y, before, k, told=UNTOLD):
     """Follow a ray to the first facet it meets, from `before` its entry point at (x, y)."""
-    fate, facet, delicate, x, y, z = seek_facet(
-        mesh, -1, 0, x - before * k.x, y - before * k.y, mesh.frame.z_top, k.x, k.y, k.z
-    )
+    fate, facet, delicate, x, y, z = seek_told(
+        mesh, told, -1, 0, x - before * k.x, y - before * k.y, mesh.frame.z_top,
+        k.x, k.y, k.z,
+    )  # fmt: skip
     return fate, Place(delicate, 0, facet, x, y, z)
 
 

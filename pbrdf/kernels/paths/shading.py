@@ -20,8 +20,11 @@ from pbrdf.kernels.optics.volume import internal_reflectance
 Optics = namedtuple("Optics", "n kappa base n_stokes")
 # The tally: `bin_edges`; flux by bin (wavelengths, bounces, n_theta, n_dphi, stokes,
 # stokes); lit, whether a path came there (bounces, n_theta, n_dphi); energy (wavelengths,
-# N_ENERGIES); counts (N_COUNTS,); room for one matrix (4, 4)
-Tally = namedtuple("Tally", "zenith azimuth flux lit energy counts mueller")
+# N_ENERGIES); counts (N_COUNTS,); room for one matrix (4, 4); cones that take the place of
+# the bins, a `pbrdf.kernels.bodies.detectors.Cones` or None
+Tally = namedtuple(
+    "Tally", "zenith azimuth flux lit energy counts mueller cones", defaults=(None,)
+)
 
 # Columns of a record
 TURN_C, TURN_S, COS_IN, COS_OUT, LABEL, N_RECORD = 0, 1, 2, 3, 4, 5

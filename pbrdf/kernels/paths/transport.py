@@ -10,6 +10,7 @@ from collections import namedtuple
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.bins.binning import bin_of_direction
+from pbrdf.kernels.meshes.packets import UNTOLD
 from pbrdf.kernels.meshes.shots import BELOW, WRONG
 from pbrdf.kernels.optics.frames import exit_turn, kept_axis, turn_frame
 from pbrdf.kernels.optics.fresnel import reflection_elements
@@ -27,13 +28,13 @@ from pbrdf.kernels.paths.first_bounce import (
 from pbrdf.kernels.paths.ground import (
     N_PLACE,
     first_facet,
-    first_on_mesh,
     label_of_facet,
     next_facet,
     normal_of_facet,
     read_place,
     write_place,
 )
+from pbrdf.kernels.paths.mesh_lines import FATE, foresee_second, meet_first
 from pbrdf.kernels.paths.random import Draw, pair_of, uniform_pair
 from pbrdf.kernels.paths.ray_bounce import mirror_at, scatter_at
 from pbrdf.kernels.paths.shading import (
@@ -81,6 +82,10 @@ DROPPED = 8
 FIRST_CHOICE = 1
 LEAST_CHANCE, MOST_CHANCE = 0.02, 0.9
 
+
+# Entry points for each facet of a mesh from which on those side by side share their way
+# through Embree's tree
+DENSE = 0.125
 
 # What paths of one incident direction write to: record (bounces + 1, 1, N_RECORD) and
 # waiting (bounces, N_WAITING), room to work in, and where their light goes
@@ -159,11 +164,12 @@ def end_path(fate, bounces, k, s, weight, beam, sink):
 
 
 @jit(forceinline=True)
-def trace_ray(terrain, tree, mesh, fate, place, beam, draw, sink):
+def trace_ray(terrain, tree, mesh, fate, place, beam, draw, sink, told=UNTOLD):
     """Follow a ray from its first meeting with the surface until all its light has left.
 
     `fate` says what became of it so far: HIT on the facet given, or what `walk` returned;
-    `beam` is the light of its line as `line_beam` tells; `tree` as in `trace_batch`.
+    `beam` is the light of its line as `line_beam` tells; `tree` as in `trace_batch`; `told`
+    what a packet has told of what the mirror of its first facet shows.
     """
     record, waiting, spectra, optics, tally = sink
     stream, number, events = draw
@@ -209,7 +215,11 @@ def trace_ray(terrain, tree, mesh, fate, place, beam, draw, sink):
                 break
             bounces += 1
             tally.counts[N_SEGMENTS] += 1
-            fate, place = next_facet(terrain, tree, mesh, place, k, cos_beta * steep)
+            # One bounce lies behind the mirror image of the ray that entered only
+            fate, place = next_facet(
+                terrain, tree, mesh, place, k, cos_beta * steep,
+                told if bounces == 1 else UNTOLD,
+            )  # fmt: skip
 
         if fate != DROPPED:
             end_path(fate, bounces, k, s, weight, beam, sink)
@@ -301,20 +311,22 @@ def sweep_batch(terrain, source, line_room, record, waiting, spectra, optics, ta
 
 
 @jit(allocates=False)
-def trace_mesh_batch(mesh, source, record, waiting, spectra, optics, tally):
+def trace_mesh_batch(mesh, source, room, record, waiting, spectra, optics, tally):
     """`trace_batch` over a mesh: places are micrometres, entry points at its highest one.
 
-    Rays start a little before, so that none starts on a facet.
+    Rays start a little before, so that none starts on a facet. `room` is a `MeshLine`.
     """
     sink = Sink(record, waiting, spectra, optics, tally)
     margin = mesh.frame.z_top - mesh.frame.z_high
+    dense = source.n_rays > DENSE * mesh.faces.shape[0]
     tally.counts[N_EXACT] -= mesh.searches[0]
     for line in range(source.n_lines):
         beam, first, rays, points = rays_of_line(line, source, 1.0, 1.0)
         k = way_of(beam)
+        meet_first(mesh, points, source.launch, rays, k, margin / beam.cos_t, dense, room)
+        foresee_second(mesh, rays, k, room)
         for ray in range(rays):
-            x, y = entry_point(points, ray, rays, source.launch)
-            fate, place = first_on_mesh(mesh, x, y, margin / beam.cos_t, k)
+            fate, place = int(room.met[ray, FATE]), read_place(room.met, ray)
             draw = Draw(source.stream, first + ray, 0)
-            trace_ray(None, None, mesh, fate, place, beam, draw, sink)
+            trace_ray(None, None, mesh, fate, place, beam, draw, sink, room.told[ray])
     tally.counts[N_EXACT] += mesh.searches[0]
