@@ -188,8 +188,7 @@ def observe(  # noqa: PLR0913  (the public signature)
         estimator=arguments.one_of("estimator", estimator, ESTIMATORS),
         counts=estimator == COUNT
         or (estimator != "corners" and widest > NARROW_CONE * slope > 0.0),
-        from_source=arguments.one_of("start", start, ("detector", "source")) == "source"
-        or through,
+        from_source=through or _from_source(start),
         hemisphere_samples=arguments.in_range(
             "hemisphere_samples", hemisphere_samples, 0.1, 1e4, "2 is a good start."
         ),
@@ -204,15 +203,11 @@ def observe(  # noqa: PLR0913  (the public signature)
     check_memory(run, look)
     _check_growth(look.hemisphere_samples, look.sample_decay)
     judged = run.judged(angles[0], run.waves)
-    early = [
-        *judged.notes, *opaque_drop_notes(scene.contaminants, run.waves),
-        *_wide_cones(estimator, widest, slope),
-    ]  # fmt: skip
+    early = [*judged.notes, *_wide_cones(estimator, widest, slope)]
+    early += opaque_drop_notes(scene.contaminants, run.waves)
     _warn(early)
     seen = look_at_samples(run, look)
-    lost = lost_ray_warnings(int(seen.counts[N_LEAKED]), seen.bundles)
-    fates = ("left_sideways",) if lost else ("leaked", "left_sideways")
-    late = [*seen.notes, *lost, *_missing_light(seen, fates)]
+    late = [*seen.notes, *_lost_light(seen)]
     cut = _missing_light(seen, ("truncated",))
     # Told in any case, but no surprise to one who set a low limit
     _warn([*late, *(cut if look.max_bounces >= MOST_BOUNCES else ())])
@@ -250,6 +245,10 @@ def _angles(
     return angles
 
 
+def _from_source(start: str) -> bool:
+    return arguments.one_of("start", start, ("detector", "source")) == "source"
+
+
 def _goes_through(scene: Scene, estimator: str) -> bool:
     """Whether light goes through bodies of a scene; then it can only be counted."""
     clear = bool(covering_materials(scene))
@@ -278,6 +277,13 @@ def _warn(notes: Iterable[str]) -> None:
     """Warn whoever called `observe`."""
     for note in notes:
         warnings.warn(note, AccuracyWarning, stacklevel=3)
+
+
+def _lost_light(seen: Readings) -> list[str]:
+    """Say what was lost by a fault, or left a finite surface beyond its rim."""
+    lost = lost_ray_warnings(int(seen.counts[N_LEAKED]), seen.bundles)
+    fates = ("left_sideways",) if lost else ("leaked", "left_sideways")
+    return lost + _missing_light(seen, fates)
 
 
 def _missing_light(seen: Readings, fates: tuple[str, ...]) -> list[str]:

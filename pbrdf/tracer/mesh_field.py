@@ -89,6 +89,16 @@ def packet_room(context: int) -> Packet:
     )  # fmt: skip
 
 
+def scene_flags(surface: MeshSurface) -> int:
+    """Flags of Embree's scene: robust, but where a ray that slips through is noticed.
+
+    In a closed opaque body it meets a back next, or falls through the ground, and is
+    traced again.
+    """
+    quick = surface.kind != "sheet" and surface.parts == 1 and not surface.transparent
+    return SCENE_ASKS_BACK | (0 if quick else SCENE_ROBUST)
+
+
 def free_slope(surface: MeshSurface) -> float:
     """Slope from which on a rising ray is free: infinite where the mesh hangs over."""
     level = surface.normals[:, 2]
@@ -182,9 +192,7 @@ class MeshField:
             tolerance=TOLERANCE * unit,
         )
         vertices = ((surface.vertices - center) / unit).astype(np.float32)
-        # A ray that slips through a closed mesh meets a back next, and is traced again
-        quick = surface.kind != "sheet" and surface.parts == 1 and not surface.transparent
-        flags = SCENE_ASKS_BACK | (0 if quick else SCENE_ROBUST)
+        flags = scene_flags(surface)
         scene = build_tree(vertices, surface.faces, flags)
         if surface.period is not None:
             tree, scene = scene, build_images(scene, images / unit, flags)
