@@ -90,7 +90,7 @@ def packet_room(context: int) -> Packet:
 
 
 def scene_flags(surface: MeshSurface) -> int:
-    """Flags of Embree's scene: robust, but where a ray that slips through is noticed.
+    """Say whether Embree has to be robust: not where a ray that slips through is noticed.
 
     In a closed opaque body it meets a back next, or falls through the ground, and is
     traced again.
