@@ -24,6 +24,7 @@ from pbrdf.surface import MeshSurface
 from pbrdf.tracer import arguments
 from pbrdf.tracer.asked import Run
 from pbrdf.tracer.media import media_of_scene
+from pbrdf.wave import WaveModel
 
 # Where paths are cut: on a clean surface, and where transparent bodies may catch light
 MOST_BOUNCES, MOST_EVENTS = 64, 1024
@@ -55,7 +56,7 @@ def simulate(  # noqa: PLR0913  (the public signature)
     explain: bool = False,
     source_half_angle: float = 0.0,
     fold: bool = False,
-    wave: str | None = None,
+    wave: str | WaveModel | None = None,
     variance_reduction: bool = True,
 ) -> xr.Dataset:
     """Trace light from the source to the hemisphere and bin it as Mueller BRDF.
@@ -110,9 +111,10 @@ def simulate(  # noqa: PLR0913  (the public signature)
         the variance. For scenes that are their own mirror image in the mean only: an
         isotropic random surface on a square grid or a flat one, drops and spheres drawn
         anew for every realisation, and phi_i="uniform".
-    wave : str, optional
+    wave : str or WaveModel, optional
         Let waves do the first bounce by this form of `pbrdf.wave.METHODS`, "auto" say, and
-        add their mean field as `coherent`, a beam apart from the BRDF. For clean isotropic
+        add their mean field as `coherent`, a beam apart from the BRDF. A WaveModel is a
+        fine structure on the facets of the surface (`pbrdf.wave.TwoScaleModel`). For clean
         Gaussian surfaces at given wavelengths. Later bounces are those of the rays.
     variance_reduction : bool
         Take single bounces on a GaussianSurface from the known law of its slopes and from
@@ -207,7 +209,7 @@ def planned(*, whole: bool = True, **given: Any) -> Ready:
     )  # fmt: skip
     plans, several = _plans(run, theta_i, given["phi_i"], **geometry)
     if wave is not None:
-        check_waves(scene, wave, run.waves, given["stokes"], plans[0].half_angle)
+        check_waves(scene, wave, run.waves, given["stokes"], plans[0])
     return Ready(
         run=run, plans=plans, several=several, single=None, chosen=chosen, given=given
     )

@@ -3,5 +3,6 @@
 from pbrdf.wave.height_map import map_scattering
 from pbrdf.wave.methods import METHODS
 from pbrdf.wave.model import WaveModel
+from pbrdf.wave.two_scale import TwoScaleModel
 
-__all__ = ["METHODS", "WaveModel", "map_scattering"]
+__all__ = ["METHODS", "TwoScaleModel", "WaveModel", "map_scattering"]

@@ -126,7 +126,8 @@ class Scattering:
         for at in each_wavelength(columns[3]):
             limit = 4 * np.pi / float(columns[3][at[0]])
             theta_i, theta_s, dphi = (c[at] for c in columns[:3])
-            rows[at] *= smith(heights, theta_i, theta_s, dphi, phi_i[at], limit)[:, None]
+            slopes = (heights.slopes(limit, turn) for turn in (phi_i[at], phi_i[at] + dphi))
+            rows[at] *= smith(theta_i, theta_s, dphi, *slopes)[:, None]
 
     def _lateral(self, columns: list[Array], phi_i: Array | float) -> Array | None:
         """Return what stands for K [rad/um], where heights know its direction."""

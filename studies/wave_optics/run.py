@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from pbrdf import AccuracyWarning, GaussianSurface, Material, Scene, WaveModel, simulate
-from pbrdf.wave import METHODS
+from pbrdf.wave import METHODS, TwoScaleModel
 from tests import wave_reference
 
 HERE = Path(__file__).parent
@@ -220,6 +220,36 @@ def draw_sweep() -> None:
     print(f"{np.abs(steps).max():.3f}; second differences up to {bends:.3f}")
 
 
+def scales() -> None:
+    """Print facets with a fine structure beside waves over both scales at once."""
+    coarse, small = (1.5, 15.0), (0.05, 0.5)
+    variance = coarse[0] ** 2 + small[0] ** 2
+    views = np.deg2rad([0, 20, 35, 50, 60, 70, 80])
+
+    def correlation(x: np.ndarray) -> np.ndarray:
+        parts = [h**2 * np.exp(-((x / length) ** 2)) for h, length in (coarse, small)]
+        return sum(parts) / variance
+
+    print(
+        "\nTwo scales at 35 degrees, in plane: ratio of M00 at zeniths", np.rad2deg(views)
+    )
+    for material in (Material(1.5), Material(1.2, 6.9), Material.mirror()):
+        fine = WaveModel(material, height_rms=small[0], corr_length=small[1])
+        two = TwoScaleModel(fine, np.sqrt(2) * coarse[0] / coarse[1])
+        both = WaveModel(
+            material, height_rms=np.sqrt(variance), autocorrelation=correlation
+        )
+        ratio = two.brdf(views[2], views, np.pi, 1.0) / both.brdf(
+            views[2], views, np.pi, 1.0
+        )
+        shares = two.shares(views[2], 1.0)
+        print(
+            f"n {material.n:4}: {ratio[:, 0, 0].round(3)}; mirrored "
+            f"{shares['mirrored']:.4f}, scattered {shares['scattered']:.4f}, rest "
+            f"{shares['rest']:.4f}"
+        )
+
+
 def speed() -> None:
     """Print Mueller matrices a second for one surface."""
     rng = np.random.default_rng(1)
@@ -237,7 +267,8 @@ def speed() -> None:
 
 PARTS = {
     "forms": forms, "coherent": coherent, "energy": energy, "rough": rough,
-    "joined": joined,    "map": draw_map, "sweep": draw_sweep, "speed": speed,
+    "joined": joined, "scales": scales, "map": draw_map, "sweep": draw_sweep,
+    "speed": speed,
 }  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """Waves for the first bounce, rays for the later ones: energy, sums, refusals."""
 
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
@@ -12,6 +13,7 @@ from pbrdf import (
     WaveModel,
     simulate,
 )
+from pbrdf.derived.bins import bin_averages
 
 SURFACE = GaussianSurface(shape=(128, 128), spacing=0.125, corr_length=1.0, height_rms=0.25)
 GIVEN = {
@@ -68,6 +70,51 @@ def test_the_first_bounce_is_the_model_and_the_rest_the_rays() -> None:
     assert_allclose(sum_of_all, 1.0, atol=1e-12)
 
 
+COARSE = GaussianSurface(
+    shape=(128, 128), spacing=0.5, corr_length=8.0, height_rms=1.6
+)  # fmt: skip
+
+
+def test_fine_structure_under_traced_facets_keeps_the_light_of_a_mirror():
+    fine = WaveModel(Material.mirror(), height_rms=0.05, corr_length=0.5)
+    given = GIVEN | {"n_rays": 1000, "n_theta": 9, "n_dphi": 12}
+    run = simulate(
+        Scene(COARSE, Material.mirror()), 0.3, wavelength=1.0, wave=fine, **given
+    )
+    assert run.albedo.sum("bounces").values == pytest.approx(1.0, abs=0.03)
+    assert not run.coherent.any()
+    assert run.attrs["wave"].startswith("two scales: auto, height_rms 0.05 um")
+    once = run.brdf.sel(bounces="1").isel(theta_i=0)[..., 0, 0]
+    share = (once * run.projected_solid_angle).sum().item()
+    # Nearly all of it leaves at once
+    assert share == pytest.approx(0.97, abs=0.02)
+
+
+def test_brushed_surfaces_turn_with_the_source():
+    brushed = GaussianSurface(
+        shape=(96, 64), spacing=0.2, corr_length=(4.0, 1.0), height_rms=0.1
+    )
+    given = GIVEN | {"n_rays": 500, "phi_i": 0.6, "wavelength": 1.0}
+    run = simulate(Scene(brushed, Material(1.2, 6.9)), 0.5, wave="auto", **given)
+    model = WaveModel(Material(1.2, 6.9), height_rms=0.1, corr_length=(4.0, 1.0))
+    assert_allclose(run.coherent[0], model.coherent(0.5, 1.0, phi_i=0.6), atol=1e-9)
+    bins = {"n_theta": 18, "n_dphi": 24, "wavelength": 1.0}
+    expected, other = (
+        bin_averages(model, 0.5, phi_i=phi_i, **bins) for phi_i in (0.6, -0.6)
+    )
+    found = run.brdf.sel(bounces="1").isel(theta_i=0).values
+    bright = expected[..., 0, 0] > 0.05 * expected[..., 0, 0].max()
+    scale = expected[bright][:, :1, :1]
+    assert np.abs((found - expected)[bright] / scale).max() < 0.02
+    assert np.abs((found - other)[bright] / scale).max() > 0.3
+    around = simulate(
+        Scene(brushed, Material(1.2, 6.9)), 0.5, wave="auto", **given | {"phi_i": "uniform"}
+    )
+    # All light of all azimuths, with what goes below
+    total = around.albedo.sum() + around.coherent[0, 0, 0] + around.absorbed[0]
+    assert total.item() == pytest.approx(1.0, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("surface", "material", "given", "fault"),
     [
@@ -94,7 +141,25 @@ def test_the_first_bounce_is_the_model_and_the_rest_the_rays() -> None:
             HeightMap.flat(size=(1.0, 1.0)),
             Material(1.5),
             {"wavelength": 1.0},
-            "must be an isotropic GaussianSurface with wave, got HeightMap",
+            "must be a GaussianSurface with wave, got HeightMap",
+        ),
+        (
+            SURFACE,
+            Material(1.5),
+            {
+                "wavelength": 9.0,
+                "wave": WaveModel(Material(1.5), height_rms=0.1, corr_length=1.0),
+            },
+            "must be rough on the scale of the wavelength",
+        ),
+        (
+            COARSE,
+            Material(1.5),
+            {
+                "wavelength": 0.5,
+                "wave": WaveModel(Material(1.6), height_rms=0.1, corr_length=1.0),
+            },
+            "wave must have the material of the substrate",
         ),
     ],
 )
