@@ -15,10 +15,9 @@ from pbrdf.kernels.wave.scatter import (
     Plan,
     fill_scattering,
 )
-from pbrdf.wave.directional import Directional
+from pbrdf.wave.directional import Directional, smith
 from pbrdf.wave.methods import method_of
 from pbrdf.wave.order_table import OrderTable
-from pbrdf.wave.shadows import smith
 from pbrdf.wave.specular import Retardance, mean_jones
 from pbrdf.wave.statistics import Statistics
 

@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from pbrdf.analytic.geometry import flat_geometry
 from pbrdf.errors import AccuracyWarning, one_number
+from pbrdf.wave.directional import smith
 from pbrdf.wave.energy import hemisphere
 from pbrdf.wave.model import WaveModel, checked_wavelength
-from pbrdf.wave.shadows import smith
 
 __all__ = ["TwoScaleModel"]
 
