@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from pbrdf.surface.mesh.topology import face_vectors
+from pbrdf.surface.mesh.topology import face_vectors, parts
 
 # Vertices nearer than this share of the extent are one
 MERGE = 1e-9
@@ -12,6 +13,8 @@ MERGE = 1e-9
 FLAT = 1e-9
 # Places named in a message
 NAMED = 3
+# Steps of float32 above this share of the median edge turn facets; edges looked at
+COARSE, MOST_SAMPLED = 1e-3, 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,8 +145,32 @@ def _merged(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     first = np.r_[True, (grid[order][1:] != grid[order][:-1]).any(axis=1)]
     leader = np.empty(len(vertices), dtype=np.int64)
     leader[order] = np.minimum.reduceat(order, np.flatnonzero(first))[np.cumsum(first) - 1]
+    # What lies across a line of the grid
+    each = np.unique(leader)
+    pairs = cKDTree(vertices[each]).query_pairs(MERGE * extent, output_type="ndarray")
+    if len(pairs):
+        group = parts(len(each), (pairs[:, 0], pairs[:, 1]))
+        _, lead = np.unique(group, return_index=True)
+        leader = each[lead[group]][np.searchsorted(each, leader)]
     merged: np.ndarray = leader[faces]
     return merged
+
+
+def rounding_note(vertices: np.ndarray, faces: np.ndarray) -> tuple[str, ...]:
+    """Warn of vertices of a float32 file that lie too far from its origin."""
+    step = float(np.spacing(np.abs(vertices).max().astype(np.float32)))
+    if not np.array_equal(vertices.astype(np.float32), vertices):
+        return ()
+    corners = vertices[faces[:: -(-len(faces) // MOST_SAMPLED)]]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    middle = float(np.median(sides))
+    if step <= COARSE * middle:
+        return ()
+    return (
+        f"Vertices lie up to {np.abs(vertices).max():.3g} from the origin, where the "
+        f"float32 numbers of a file are {step:.2g} apart: {100 * step / middle:.2g} % of "
+        "the median edge. Move the mesh to its origin before it is written.",
+    )
 
 
 def without_flat_faces(mesh: Mended) -> Mended:

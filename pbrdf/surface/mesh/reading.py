@@ -82,7 +82,12 @@ def _raw_of(loaded: Any) -> Raw | None:
     """Take a Trimesh, or a scene of several, apart; None of anything else."""
     if hasattr(loaded, "geometry"):
         pieces = []
-        for node in loaded.graph.nodes_geometry:
+        # The nodes of a graph come in an order of their own, not that of the file
+        order = {name: number for number, name in enumerate(loaded.geometry)}
+        nodes = sorted(
+            loaded.graph.nodes_geometry, key=lambda node: order[loaded.graph[node][1]]
+        )
+        for node in nodes:
             transform, name = loaded.graph[node]
             piece = loaded.geometry[name]
             if hasattr(piece, "faces"):

@@ -212,6 +212,18 @@ def _not_hollows(
     return wrong
 
 
+def _cure(vertices: np.ndarray, period: tuple[float, float] | None) -> str:
+    """Say what may be wrong with open edges."""
+    fill = "fill holes (trimesh.repair.fill_holes) or merge vertices that nearly meet"
+    if period is None:
+        return f"Give the period if they are its seam, or {fill}."
+    x, y = np.ptp(vertices[:, :2], axis=0)
+    return (
+        f"The mesh is {x:.9g} x {y:.9g} um wide, and its sides do not meet over the "
+        f"period {period}; check that, or {fill}."
+    )
+
+
 def _check_rims(
     vertices: np.ndarray,
     faces: np.ndarray,
@@ -241,7 +253,6 @@ def _check_rims(
         msg = (
             f"mesh must be closed, got {len(mine)} open edges, the first at "
             f"({middle[0]:.6g}, {middle[1]:.6g}, {middle[2]:.6g}) um, "
-            f"{named('face', source[open_faces[bad]])}. Fill the holes "
-            "(trimesh.repair.fill_holes), or give the period if they are its seam."
+            f"{named('face', source[open_faces[bad]])}. {_cure(vertices, period)}"
         )
         raise ValueError(msg)

@@ -13,7 +13,12 @@ import numpy.typing as npt
 
 from pbrdf.errors import AccuracyWarning, DataFileError, require
 from pbrdf.surface.heightmap import HeightMap
-from pbrdf.surface.mesh.mending import checked_arrays, mend, without_flat_faces
+from pbrdf.surface.mesh.mending import (
+    checked_arrays,
+    mend,
+    rounding_note,
+    without_flat_faces,
+)
 from pbrdf.surface.mesh.reading import Raw, micrometres, raw_mesh
 from pbrdf.surface.mesh.sides import with_sides
 from pbrdf.surface.mesh.solids import transparent_solids
@@ -76,7 +81,8 @@ class MeshSurface:
     Warns
     -----
     AccuracyWarning
-        If faces were left out or turned.
+        If faces were left out or turned, or the numbers of a file are coarse where the
+        mesh lies.
 
     Examples
     --------
@@ -109,7 +115,9 @@ class MeshSurface:
         raw = raw_mesh(mesh)
         lengths = None if period is None else _checked_period(period)
         try:
-            self._build(raw, lengths, labels, micrometres(unit, raw.unit), transparent)
+            doubts = self._build(
+                raw, lengths, labels, micrometres(unit, raw.unit), transparent
+            )
         except DataFileError:
             raise
         except (TypeError, ValueError) as error:
@@ -117,7 +125,7 @@ class MeshSurface:
                 raise
             problem, _, cure = str(error).rstrip(".").rpartition(". ")
             raise DataFileError(Path(mesh), problem or cure, f"{cure}.") from error
-        for note in self.repairs:
+        for note in (*doubts, *self.repairs):
             warnings.warn(note, AccuracyWarning, stacklevel=2)
 
     def _build(
@@ -127,7 +135,7 @@ class MeshSurface:
         labels: npt.ArrayLike | str | None,
         unit: float,
         transparent: bool | Sequence[int],
-    ) -> None:
+    ) -> tuple[str, ...]:
         vertices, faces = checked_arrays(raw.vertices, raw.faces)
         if _is_parts(labels):
             labels = raw.parts
@@ -153,6 +161,7 @@ class MeshSurface:
             ("solid_labels", clear.labels), ("transparent", tuple(sorted({*clear.labels}))),
         ):  # fmt: skip
             object.__setattr__(self, name, value)
+        return rounding_note(vertices, faces)
 
     def __repr__(self) -> str:
         lies = "alone" if self.period is None else f"period={self.period} um"
