@@ -214,13 +214,13 @@ def _not_hollows(
 
 def _cure(vertices: np.ndarray, period: tuple[float, float] | None) -> str:
     """Say what may be wrong with open edges."""
-    fill = "fill holes (trimesh.repair.fill_holes) or merge vertices that nearly meet"
+    fill = "the holes (trimesh.repair.fill_holes) or merge vertices that nearly meet"
     if period is None:
-        return f"Give the period if they are its seam, or {fill}."
+        return f"Fill {fill}, or give the period if they are its seam."
     x, y = np.ptp(vertices[:, :2], axis=0)
     return (
         f"The mesh is {x:.9g} x {y:.9g} um wide, and its sides do not meet over the "
-        f"period {period}; check that, or {fill}."
+        f"period {period}; check that, or fill {fill}."
     )
 
 
