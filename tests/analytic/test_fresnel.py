@@ -9,6 +9,8 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
+from pbrdf.kernels import from_python
+from pbrdf.kernels.optics import fresnel as kernels
 from pbrdf.optics import (
     Material,
     fresnel_amplitudes,
@@ -111,3 +113,56 @@ def test_bad_values_are_named(arguments, message):
 def test_complex_index_is_refused_not_reinterpreted():
     with pytest.raises(TypeError, match="n must be real, got complex"):
         specular_mueller(0.5, 1.5 - 0.1j)
+
+
+def by_the_book(cosine, n, kappa):
+    """T_s, T_p and t_s conj(t_p) from the amplitudes of Born and Wolf, 1.5.2."""
+    index = complex(n, kappa)
+    inner = np.sqrt(1 - (1 - cosine**2) / index**2 + 0j)
+    inner = inner if (index * inner).imag >= 0 else -inner
+    t_s = 2 * cosine / (cosine + index * inner)
+    t_p = 2 * cosine / (index * cosine + inner)
+    power_s = (index * inner).real / cosine * abs(t_s) ** 2
+    power_p = (index * inner.conjugate()).real / cosine * abs(t_p) ** 2
+    return power_s, power_p, t_s * t_p.conjugate()
+
+
+@pytest.mark.parametrize(
+    ("n", "kappa"), [(1.5, 0.0), (1.37, 7.62), (0.7, 0.3), (0.7, 0.0), (4.0, 1e-3)]
+)
+def test_transmission_is_that_of_the_book(n, kappa):
+    parts = from_python(kernels.transmission_parts)
+    for cosine in (0.05, 0.3, 0.6, 0.95, 1.0):
+        power_s, power_p, turn = by_the_book(cosine, n, kappa)
+        half, difference = (power_s + power_p) / 2, (power_s - power_p) / 2
+        mean = np.sqrt(max(power_s * power_p, 0.0))
+        assert_allclose(parts(cosine, n, kappa), [half, difference, mean], atol=2e-14)
+        c, d = mean * turn.real / abs(turn), mean * turn.imag / abs(turn)
+        assert_allclose(
+            transmission_mueller(cosine, n, kappa),
+            [
+                [half, difference, 0, 0],
+                [difference, half, 0, 0],
+                [0, 0, c, -d],
+                [0, 0, d, c],
+            ],
+            atol=2e-14,
+        )
+
+
+def test_kernels_without_a_branch_know_the_mirror():
+    for cosine in (0.0, 0.4, 1.0):
+        sin2 = 1 - cosine**2
+        facet = from_python(kernels.facet_elements)(cosine, sin2, np.inf, 0.0)
+        assert facet == (1.0, 0.0, -1.0, 0.0)
+        assert from_python(kernels.transmission_parts)(cosine, np.inf, 0.0) == (0, 0, 0)
+        assert_allclose(transmission_mueller(cosine, np.inf), 0.0, atol=0)
+        # The same branch as an index that is finite takes
+        finite = from_python(kernels.facet_elements)(cosine, sin2, 1.37, 7.62)
+        assert_allclose(finite[0], specular_mueller(cosine, 1.37, 7.62)[0, 0], rtol=1e-14)
+
+
+def test_an_interface_between_equal_media_is_none():
+    for cosine in (0.0, 1e-9, 0.5):
+        assert fresnel_amplitudes(cosine, 1.0) == (0, 0)
+        assert_allclose(specular_mueller(cosine, 1.0), 0.0, atol=0)

@@ -243,7 +243,15 @@ def furnace_angles(bins=18, inner=3):
     return np.arcsin(np.sqrt(squares)).ravel(), share
 
 
-@pytest.mark.parametrize("contact_deg", [15.0, 90.0, 150.0, 179.0])
+@pytest.mark.parametrize(
+    "contact_deg",
+    [
+        pytest.param(15.0, marks=pytest.mark.slow),
+        90.0,
+        pytest.param(150.0, marks=pytest.mark.slow),
+        179.0,
+    ],
+)
 def test_c13_furnace_with_drops_on_a_mirror(contact_deg, measured):
     """Light from everywhere comes back to everywhere, alike and unpolarised."""
     # Three drops of which two overlap, so that light also crosses within the water

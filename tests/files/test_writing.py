@@ -228,7 +228,15 @@ def test_a_full_disk_ends_a_command_in_one_line(tmp_path, limit):
     assert names(tmp_path) == []
 
 
-@pytest.mark.parametrize("limit", [0, 1000, 40_000, 100_000])
+@pytest.mark.parametrize(
+    "limit",
+    [
+        pytest.param(0, marks=pytest.mark.slow),
+        1000,
+        pytest.param(40_000, marks=pytest.mark.slow),
+        pytest.param(100_000, marks=pytest.mark.slow),
+    ],
+)
 def test_a_full_disk_leaves_results_in_memory(tmp_path, limit):
     """HDF5 itself took the interpreter with it here."""
     run = subprocess.run(

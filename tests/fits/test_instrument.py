@@ -102,6 +102,7 @@ def test_a_flank_wrong_by_a_fringe_is_bridged(band: float) -> None:
     assert np.hypot(*np.gradient(wrong, 0.25))[flank].mean() > 1.5 * slope[flank].mean()
 
 
+@pytest.mark.slow
 def test_named_instrument_predicts_the_true_surface() -> None:
     """Non-Gaussian grains, imaged and in bands: curves of M00 and M10."""
     true = true_surface(

@@ -78,7 +78,14 @@ def off_by(
     return float(np.sqrt(np.maximum(np.mean(off**2) - np.mean(chance**2), 0)))
 
 
-@pytest.mark.parametrize("slope", [0.1, 0.3, 0.5])
+@pytest.mark.parametrize(
+    "slope",
+    [
+        pytest.param(0.1, marks=pytest.mark.slow),
+        0.3,
+        pytest.param(0.5, marks=pytest.mark.slow),
+    ],
+)
 @pytest.mark.parametrize("element", [(0, 0), (1, 0)])
 def test_clean_map_has_the_monte_carlo_over_it(
     slope: float, element: tuple[int, int]
@@ -87,7 +94,10 @@ def test_clean_map_has_the_monte_carlo_over_it(
 
 
 # A quarter of the facets at 1 um, 256 x 256, are so few that their own lumps make 11 %
-@pytest.mark.parametrize(("phi_i", "nodes", "spacing"), [(0.0, 384, 0.6), (1.0, 512, 1.0)])
+@pytest.mark.parametrize(
+    ("phi_i", "nodes", "spacing"),
+    [(0.0, 384, 0.6), pytest.param(1.0, 512, 1.0, marks=pytest.mark.slow)],
+)
 def test_each_azimuth_of_a_brushed_map_has_its_own_monte_carlo(
     phi_i: float, nodes: int, spacing: float
 ) -> None:

@@ -214,6 +214,7 @@ def test_a_slope_far_from_the_traced_one_is_named(model: SimulatedModel) -> None
     assert not model.remarks
 
 
+@pytest.mark.slow
 def test_an_index_for_each_wavelength(model: SimulatedModel) -> None:
     table = Material.from_table(wavelength=[0.4, 0.8], n=[1.6, 1.4], kappa=[0.1, 0.3])
     coloured = SimulatedModel(

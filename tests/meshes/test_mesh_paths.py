@@ -55,7 +55,9 @@ def beams(mesh, count, seed):
 UNSURE = 2e-5
 
 
-@pytest.mark.parametrize("shape", ["mushrooms", "bodies", "rough"])
+@pytest.mark.parametrize(
+    "shape", [pytest.param("mushrooms", marks=pytest.mark.slow), "bodies", "rough"]
+)
 def test_paths_are_those_of_every_triangle_tried_in_turn(shape):
     if shape == "mushrooms":
         mesh = mushrooms()

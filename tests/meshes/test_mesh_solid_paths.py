@@ -104,7 +104,9 @@ def launched(state, place, k):
     state[0, MUELLER::5][:4] = 1.0
 
 
-@pytest.mark.parametrize("shape", ["overhang", "boxes"])
+@pytest.mark.parametrize(
+    "shape", [pytest.param("overhang", marks=pytest.mark.slow), "boxes"]
+)
 def test_paths_and_media_are_those_of_every_triangle_tried_in_turn(shape):
     mesh = overhang()
     if shape == "boxes":

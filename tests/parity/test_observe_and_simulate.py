@@ -60,12 +60,12 @@ def hemisphere():
 @pytest.mark.parametrize(
     ("name", "estimator", "start", "n_rays"),
     [
-        ("glass", "facets", "detector", 12_000),
+        pytest.param("glass", "facets", "detector", 12_000, marks=pytest.mark.slow),
         ("glass", "corners", "source", 12_000),
         ("aluminium", "facets", "source", 12_000),
         ("aluminium", "paths", "source", 12_000),
         ("aluminium", "count", "source", 12_000),
-        ("paint", "paths", "detector", 4000),
+        pytest.param("paint", "paths", "detector", 4000, marks=pytest.mark.slow),
         ("paint", "corners", "source", 4000),
         ("paint", "count", "source", 12_000),
     ],

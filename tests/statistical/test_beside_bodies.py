@@ -27,8 +27,15 @@ def mirror_errors(run, theta_i):
     return run.brdf_total_stderr.isel(one).values[near] / light
 
 
-@pytest.mark.parametrize("phi_i", [0.6, "uniform"])
-@pytest.mark.parametrize("wet", [SPHERES, DROPS], ids=["spheres", "drops"])
+@pytest.mark.parametrize(
+    ("phi_i", "wet"),
+    [
+        pytest.param(0.6, SPHERES, id="spheres-0.6"),
+        pytest.param("uniform", DROPS, id="drops-uniform"),
+        pytest.param("uniform", SPHERES, id="spheres-uniform", marks=pytest.mark.slow),
+        pytest.param(0.6, DROPS, id="drops-0.6", marks=pytest.mark.slow),
+    ],
+)
 def test_all_elements_of_all_bounces_agree_with_rays(phi_i, wet):
     scene, theta_i = Scene(SURFACE, GLASS, wet), np.deg2rad([20.0, 50.0])
     # More realisations of the plain estimator, from other seeds
@@ -65,6 +72,7 @@ def test_there_is_less_noise_about_the_mirror_direction(wet):
     assert (plain.brdf[1:] == reduced.brdf[1:]).all()
 
 
+@pytest.mark.slow
 def test_the_correction_is_nothing_in_the_mean():
     """Of many seeds, bin by bin: what is added to the very same rays."""
     scene = Scene(SURFACE, GLASS, SPHERES)

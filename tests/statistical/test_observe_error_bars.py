@@ -62,6 +62,7 @@ def test_errors_over_batches_of_a_fixed_surface(estimator):
     assert 0.7 < ratio < 1.35
 
 
+@pytest.mark.slow
 def test_rare_glints_have_honest_errors():
     """Three mirrors seldom meet the source, and then outshine all that the base sends."""
     seeds = 24

@@ -134,6 +134,7 @@ def test_folding_averages_each_bin_with_its_mirror_image():
     assert np.abs(z).max() < 6.0
 
 
+@pytest.mark.slow
 def test_stated_errors_of_folded_runs_are_their_spread():
     """Half the variance off the plane of incidence, and stated so."""
     runs = {fold: [folded(100 + s, fold) for s in range(40)] for fold in (False, True)}
