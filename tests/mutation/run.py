@@ -1,13 +1,16 @@
 """Change one sign or factor of the physics at a time and see whether a test notices.
 
     python tests/mutation/run.py --named
+    python tests/mutation/run.py --judged [NAME ...] [--every N]
     python tests/mutation/run.py MODULE.py TEST.py [TEST.py ...]
 
-The first form makes the mutants that once survived; the second every mutant of a module
-(each + and -, * and /, sign, comparison and number of its arithmetic), and runs the tests
-that follow. Each runs in a copy of the sources with the compiler of kernels off, and
-stops at its first failure; without a mutation the tests must pass there. Survivors are
-listed; exit code 1 if there are any. Not part of the suite: a module takes minutes.
+The first form makes the mutants that once survived. The second makes every mutant of the
+modules in `JUDGED` (each + and -, * and /, sign, comparison and number of its arithmetic),
+or every N-th, and runs the tests named there; the third does so for any module and tests.
+Each runs in a copy of the sources with the compiler of kernels off, and stops at its first
+failure; without a mutation the tests must pass there. Survivors are listed; exit code 1 if
+there are any. Not part of the suite: a module takes minutes. What was found is in
+README.md beside this file.
 """
 
 import argparse
@@ -32,6 +35,34 @@ SHADOWING = "pbrdf/kernels/microfacet/shadowing.py"
 SLOPES = "pbrdf/kernels/microfacet/slopes.py"
 SCATTER = "fitting/statistics/axis/scatter.py"
 NIST = "data_io/goniometer/formats/nist.py"
+FACETS = "tests/analytic/test_slopes_and_shadowing.py"
+# Modules of physics, and the tests that are to notice what is changed in them
+JUDGED = {
+    "fresnel": ("pbrdf/kernels/optics/fresnel.py", ["tests/analytic/test_fresnel.py"]),
+    "light": (
+        "pbrdf/kernels/optics/light.py",
+        ["tests/analytic/test_light_at_a_facet.py"],
+    ),
+    "shadowing": (SHADOWING, [FACETS, PINS]),
+    "slopes": (SLOPES, [FACETS, PINS]),
+    "facet": (
+        "pbrdf/kernels/microfacet/facet.py",
+        ["tests/analytic/test_microfacet.py", FACETS],
+    ),
+    "bodies": (
+        "pbrdf/kernels/bodies/bodies.py",
+        ["tests/contaminants/test_contaminant_laws.py", "-k", "slices"],
+    ),
+    "interfaces": (
+        "pbrdf/kernels/bodies/interfaces.py",
+        ["tests/contaminants/test_drops_exact.py", "-k", "prism"],
+    ),
+    "scatter": (SCATTER, [PINS, "tests/fits/test_statistics_parts.py"]),
+    "uncertainty": (
+        "fitting/objective/uncertainty.py",
+        [PINS, "tests/fits/test_fit_solvers.py"],
+    ),
+}
 # Read once, before mutants are split off
 PRELOADED = ("numpy", "scipy.integrate", "scipy.special", "numba", "pandas", "xarray")
 # module, text, what it becomes, name of the test that must fail
@@ -125,6 +156,7 @@ def main() -> int:
     parser.add_argument("module", nargs="?")
     parser.add_argument("tests", nargs="*")
     parser.add_argument("--named", action="store_true")
+    parser.add_argument("--judged", nargs="*", choices=JUDGED, metavar="NAME")
     parser.add_argument("--every", type=int, default=1, help="only every N-th mutant")
     parser.add_argument("--seconds", type=float, default=300.0, help="limit of one run")
     given = parser.parse_args()
@@ -147,10 +179,15 @@ def main() -> int:
                 for module, old, new, test in NAMED
             ]
         else:
-            listed = list(mutants((ROOT / given.module).read_text()))[:: given.every]
+            chosen = [(given.module, given.tests)]
+            if given.judged is not None:
+                chosen = [JUDGED[name] for name in given.judged or JUDGED]
             todo = [
-                (given.module, f"line {line}: {what}", text, given.tests)
-                for line, what, text in listed
+                (module, f"line {line}: {what}", text, tests)
+                for module, tests in chosen
+                for line, what, text in list(mutants((ROOT / module).read_text()))[
+                    :: given.every
+                ]
             ]
         for tests in {tuple(tests) for *_, tests in todo}:
             if not passes(folder, list(tests), given.seconds):

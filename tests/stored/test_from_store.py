@@ -53,6 +53,7 @@ def test_it_is_continuous_and_keeps_mirror_symmetry_of_frames(store: Path) -> No
     assert_allclose(aside[1, 0], -ahead[1, 0], atol=2e-2 * ahead[0, 0])
 
 
+@pytest.mark.slow
 def test_the_stated_error_holds_at_fresh_points_and_seeds(store: Path) -> None:
     """Against direct runs of many more rays, in bins half as wide about other centres."""
     source = pbrdf.from_store(store)
@@ -223,6 +224,7 @@ def test_degrees_and_names_of_the_file_are_understood(tmp_path: Path) -> None:
         source.brdf(0.1, 0.5, np.pi, material="bk7", corr_length=5.0)
 
 
+@pytest.mark.slow
 def test_a_point_is_exported_and_plotted(store: Path, tmp_path: Path) -> None:
     from pbrdf.cli import main
 

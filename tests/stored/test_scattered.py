@@ -105,7 +105,7 @@ def known(noise: float) -> StoredBRDF:
     return StoredBRDF(Contents(path=path, dataset=dataset, parameters=held, cloud=cloud))
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize("noise", [pytest.param(0.0, marks=pytest.mark.slow), 0.02])
 def test_the_stated_error_is_the_true_one_within_a_factor(noise: float) -> None:
     for name, ratio in stated_over_true(known(noise), places=6).items():
         assert 0.8 < np.median(ratio) < 3.0, (name, ratio)

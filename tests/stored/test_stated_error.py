@@ -97,7 +97,14 @@ def stated_over_true(store: StoredBRDF, places: int = 10) -> dict[str, np.ndarra
     return {name: np.array(ratios) for name, ratios in found.items()}
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.01, 0.04])
+@pytest.mark.parametrize(
+    "noise",
+    [
+        pytest.param(0.0, marks=pytest.mark.slow),
+        0.01,
+        pytest.param(0.04, marks=pytest.mark.slow),
+    ],
+)
 def test_the_stated_error_is_the_true_one_within_a_factor(noise: float) -> None:
     ratios = stated_over_true(store_of(SLOPES, noise))
     for name, ratio in ratios.items():

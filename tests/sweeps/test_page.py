@@ -14,11 +14,9 @@ from tests.sweeps.scenes import SWEEP, serial_run
 zarr = pytest.importorskip("zarr", reason="the extra sweeps is not installed")
 
 
-@pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("sweep")
-    serial_run(folder)
-    return folder / "s.zarr"
+@pytest.fixture
+def store(whole):
+    return whole / "s.zarr"
 
 
 def test_the_command_makes_the_page_of_a_store(store, tmp_path):

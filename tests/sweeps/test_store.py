@@ -13,18 +13,9 @@ from numpy.testing import assert_array_equal
 import pbrdf
 from pbrdf.sweeps import Sweep, load_sweep, run_sweep, tasks
 from pbrdf.sweeps.expectation import forecast
-from tests.sweeps.scenes import SWEEP, opened, serial_run, written
+from tests.sweeps.scenes import SWEEP, opened, written
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*:pbrdf.AccuracyWarning")
-
-
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The store of the serial run."""
-    folder = tmp_path_factory.mktemp("whole")
-    report = serial_run(folder)
-    assert (report.computed, report.kept, report.errors) == (6, 0, {})
-    return folder
 
 
 def copied(whole: Path, target: Path) -> tuple[Sweep, Path]:

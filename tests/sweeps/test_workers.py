@@ -171,6 +171,7 @@ def test_random_kills_of_everybody_leave_the_serial_store() -> None:
     assert min(told["worker"], told["scheduler"], told["client"]) >= 1
 
 
+@pytest.mark.slow
 def test_a_terminated_sweep_says_what_it_keeps(tmp_path: Path) -> None:
     written(tmp_path, MANY)
     command = f"{ALONE}from pbrdf.cli import main; import sys; sys.exit(main())"
