@@ -8,6 +8,7 @@ import importlib
 import subprocess
 import sys
 from collections import Counter
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -39,11 +40,17 @@ KERNEL_IMPORTS = {
 MODULES = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
 
 
+@cache
+def tree(source: Path) -> ast.Module:
+    return ast.parse(source.read_text())
+
+
+@cache
 def imported(source: Path) -> set[str]:
     """Absolute dotted names that a module imports anywhere in its text."""
     package = source.relative_to(ROOT).parent.parts
     names = set()
-    for node in ast.walk(ast.parse(source.read_text())):
+    for node in ast.walk(tree(source)):
         if isinstance(node, ast.Import):
             names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -182,7 +189,7 @@ def test_no_module_is_named_like_a_function_in_it() -> None:
     hidden = [
         str(path.relative_to(ROOT))
         for path in MODULES
-        for node in ast.parse(path.read_text()).body
+        for node in tree(path).body
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == path.stem
     ]
     assert not hidden
@@ -197,7 +204,7 @@ def functions() -> list[tuple[str, bool, ast.FunctionDef]]:
     return [
         (f"{path.relative_to(ROOT)}:{node.name}", "kernels" in path.parts, node)
         for path in MODULES
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in ast.walk(tree(path))
         if isinstance(node, ast.FunctionDef)
     ]
 
