@@ -337,7 +337,7 @@ def test_the_command_wants_one_surface(
         (["--n", "1.5", "--scene", "none.toml"], "come from the --scene, got both"),
         (
             ["--n", "1.5", "--slope-rms", "0.2", "--slope-distribution", "odd"],
-            "slope_distribution must be one of gaussian",
+            "--slope-distribution must be one of gaussian",
         ),
     ):
         assert main(["fit", str(tmp_path / "scan.csv"), *options]) == 2
