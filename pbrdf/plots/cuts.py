@@ -9,7 +9,7 @@ import xarray as xr
 from pbrdf.derived.elements import element, mueller
 from pbrdf.derived.places import choose, in_words
 from pbrdf.derived.plane import in_plane
-from pbrdf.plots.sheet import COLOURS, new_figure, scene_of, small, width
+from pbrdf.plots.sheet import COLOURS, beam_of, new_figure, scene_of, small, width
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -74,6 +74,7 @@ def plane_cuts(
                 colour = COLOURS[k % len(COLOURS)]
                 style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
                 axis.plot(view, value[place], style, color=colour, lw=1.0, label=label)
+                _mark_beam(axis, here, dict(zip(curves, place, strict=True)), colour)
                 if error is not None:
                     axis.fill_between(
                         view, value[place] - 2 * error[place],
@@ -95,9 +96,20 @@ def plane_cuts(
             if name in here.coords and here[name].ndim == 0
         ]
         note = "plane of incidence, + forward; bands: 2 standard errors"
-        lines = [", ".join(chosen), scene_of(here), note]
+        lines = [", ".join(chosen), scene_of(here), beam_of(here), note]
         figure.suptitle("\n".join(line for line in lines if line))
     return figure
+
+
+def _mark_beam(axis: Any, here: xr.Dataset, place: dict[str, int], colour: str) -> None:
+    """Draw a dotted line where a curve has its specular beam, which has no radiance."""
+    if "coherent" not in here:
+        return
+    beam = here.coherent.isel(stokes_out=0, stokes_in=0)
+    beam = beam.isel({name: i for name, i in place.items() if name in beam.dims})
+    theta = here.theta_i.isel({k: i for k, i in place.items() if k in here.theta_i.dims})
+    if float(beam) > 0.0:
+        axis.axvline(np.rad2deg(float(theta)), ls=":", lw=0.9, color=colour)
 
 
 def _scaled(axis: Any, name: str, value: np.ndarray, scale: str) -> None:

@@ -10,7 +10,7 @@ from pbrdf.derived.elements import Element, element, folded, mueller
 from pbrdf.derived.places import choose, in_words
 from pbrdf.plots.disc import Panel, colour_bar, draw_disc
 from pbrdf.plots.limits import look_of
-from pbrdf.plots.sheet import lay_out, scene_of, small, title_of, width
+from pbrdf.plots.sheet import beam_of, lay_out, scene_of, small, title_of, width
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -109,6 +109,7 @@ def hemisphere(
             for line in (
                 title_of(here) + (", folded about the plane" if mirrored else ""),
                 scene_of(here),
+                beam_of(here).replace(" (dotted)", ""),
                 note if inches > 4.5 else note.replace("   hatched", "\nhatched"),
             )
             if line

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 __all__ = [
     "COLOURS",
     "WIDTHS",
+    "beam_of",
     "halo",
     "lay_out",
     "log_ticks",
@@ -114,6 +115,18 @@ def title_of(result: xr.Dataset, *, also: Mapping[str, str] | None = None) -> st
         parts += [] if "wavelength" in result.dims else ["wavelength not given"]
     parts += [f"{name} {value}" for name, value in (also or {}).items()]
     return ", ".join(parts)
+
+
+def beam_of(result: xr.Dataset) -> str:
+    """Tell the specular beam that is no part of the BRDF, empty where there is none."""
+    if "coherent" not in result:
+        return ""
+    beam = result.coherent.isel(stokes_out=0, stokes_in=0)
+    low, high = float(beam.min()), float(beam.max())
+    if high == 0.0:
+        return ""
+    size = f"{high:.3g}" if np.isclose(low, high) else f"{low:.3g} to {high:.3g}"
+    return f"specular beam (dotted), not in the BRDF: reflectance {size}"
 
 
 def scene_of(result: xr.Dataset) -> str:

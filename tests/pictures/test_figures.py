@@ -268,3 +268,16 @@ def test_letters_over_letters_and_off_the_sheet_are_seen():
     over, off = sorted(unreadable(figure), key=len)
     assert "'one' and 'two' overlap" in over + off
     assert "'far away' leaves the sheet" in over + off
+
+
+def test_the_specular_beam_is_shown_apart():
+    result = hand_made()
+    beam = np.zeros((result.sizes["theta_i"], result.sizes["wavelength"], 4, 4))
+    beam[..., 0, 0] = 0.04
+    light = ("theta_i", "wavelength", "stokes_out", "stokes_in")
+    figure = plane_cuts(result.assign(coherent=(light, beam)), ("M00",), wavelength=0.45)
+    assert "specular beam (dotted), not in the BRDF: reflectance 0.04" in words_of(figure)
+    marks = [line for line in figure.axes[0].lines if line.get_linestyle() == ":"]
+    assert marks[0].get_xdata()[0] == pytest.approx(np.rad2deg(result.theta_i.values[0]))
+    none = plane_cuts(result.assign(coherent=(light, 0 * beam)), ("M00",), wavelength=0.45)
+    assert "specular beam" not in words_of(none)
