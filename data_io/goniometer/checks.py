@@ -112,12 +112,17 @@ def _check_values(scan: Scan) -> None:
             problem = f"expected at most {_BRIGHTEST:g}, got {values[np.argmax(far)]:.6g}"
             cure = "No surface is so bright; declare counts by --quantity relative."
             raise scan.fault(far, name, problem, cure)
+        if name in ("M00", *INTENSITIES):
+            _refuse_marks(scan, name)
         if name in ("M00", "DOLP", *INTENSITIES) or name.endswith(STDERR):
             negative = values < -_noise(scan, name)
             if negative.any():
                 value = values[np.argmax(negative)]
                 problem = f"expected a value >= 0, got {value:.9g}"
-                raise scan.fault(negative, name, problem, _negative_cure(name, value))
+                cure = _negative_cure(name, value)
+                if negative.sum() > 0.5 * np.isfinite(values).sum():
+                    cure = "Of logarithms or decibels write the numbers themselves."
+                raise scan.fault(negative, name, problem, cure)
         if name.endswith(STDERR) and name.removesuffix(STDERR) not in scan.values:
             problem = f"expected a column {name.removesuffix(STDERR)} beside it, found none"
             cure = "A standard error needs its value."
@@ -126,6 +131,20 @@ def _check_values(scan: Scan) -> None:
         problem = "expected measured values, every cell is empty"
         raise DataFileError(scan.path, problem, "Export the scan again.")
     _check_normalisation(scan)
+
+
+def _refuse_marks(scan: Scan, name: str) -> None:
+    """Refuse 9999 and the like, far above all other readings: marks of gaps."""
+    values = scan.values[name]
+    nines = np.isin(np.round(values, 6), [10.0**k - 1.0 for k in range(2, 10)])
+    others = values[~nines & np.isfinite(values)]
+    marks = nines & (values > 10.0 * np.max(others, initial=0.0))
+    if others.size and marks.any():
+        problem = (
+            f"expected a reading, got {values[np.argmax(marks)]:g} beside at most "
+            f"{others.max():.4g}"
+        )
+        raise scan.fault(marks, name, problem, "If it marks a gap, leave the cell empty.")
 
 
 _LEAVE = "Leave what was not measured empty."

@@ -219,6 +219,9 @@ def _read_at(curve: Curve, view: float) -> tuple[float, float]:
     k = int(np.clip(np.searchsorted(views, view), 1, max(views.size - 1, 1)))
     if views.size < 2 or not views[k - 1] - _SAME <= view <= views[k] + _SAME:
         return float("nan"), float("nan")
+    nearest = int(np.argmin(np.abs(views - view)))
+    if abs(views[nearest] - view) < _SAME:
+        return float(values[nearest]), float(errors[nearest])
     if views[k] - views[k - 1] > _APART:
         return float("nan"), float("nan")
     value = float(np.interp(view, views, values))

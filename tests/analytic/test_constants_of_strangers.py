@@ -70,6 +70,45 @@ def test_columns_that_are_left_out(tmp_path, capsys):
         materials.read(path, ignore=["T"])
 
 
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [
+        ("wavelength_nm n k\n400 1,5 0,1\n500 1,4 0,2\n", "utf-8"),
+        ("wavelength_nm\tn\tk\n400\t1.5\t0.1\n500\t1.4\t0.2\n", "utf-16-le"),
+        ("wavelength_nm\tn\tk\n400\t1.5\t0.1\n500\t1.4\t0.2\n", "utf-16-be"),
+        (",wavelength_nm,n,k\n0,400,1.5,0.1\n1,500,1.4,0.2\n", "utf-8"),
+        ("lambda,n,k\nnm,1,1\n400,1.5,0.1\n500,1.4,0.2\n", "utf-8"),
+        ("wavenumber (cm-1);n;k\n25000;1,5;1e\u22121\n20000;1,4;2e\u22121\n", "utf-8"),
+    ],
+)
+def test_ways_to_write_one_table(tmp_path, text, encoding):
+    (tmp_path / "film.csv").write_bytes(text.encode(encoding))
+    found = materials.read(tmp_path / "film.csv")
+    assert_allclose([found.index(0.4), found.index(0.5)], [(1.5, 0.1), (1.4, 0.2)])
+
+
+def test_a_column_of_names_is_left_out_before_the_numbers(tmp_path):
+    text = "material,wavelength_nm,n,k\nfilm,400,1.5,0.1\nfilm,500,1.4,0.2\n"
+    (tmp_path / "film.csv").write_text(text)
+    found = materials.read(tmp_path / "film.csv", ignore=["material"])
+    assert_allclose(found.index(0.45), (1.45, 0.15))
+
+
+@pytest.mark.parametrize(
+    ("rows", "cure"),
+    [
+        ("400,1.5,-0.1\n", "write the second without its sign"),
+        ("400,1.5+0.1i,0\n", "real and the imaginary part of a complex number a column"),
+        ("400,1.5,n/a\n", "Leave rows with a gap out"),
+        ("400,1.5,0.1\n500,1.5,0.1\nSource: me\n", "Remarks begin with #"),
+    ],
+)
+def test_refusals_of_constants_name_the_cure(tmp_path, rows, cure):
+    (tmp_path / "film.csv").write_text("wavelength_nm,n,k\n" + rows)
+    with pytest.raises(DataFileError, match=cure):
+        materials.read(tmp_path / "film.csv")
+
+
 def scene(tmp_path, substrate):
     text = '[surface]\ntype = "flat"\nsize_um = [1, 1]\n[substrate]\n' + substrate
     (tmp_path / "scene.toml").write_text(text)

@@ -55,6 +55,8 @@ def test_words_for_gaps_are_counted(tmp_path):
         "theta_i,theta_view,M00\n30°,10°,5%\n30°,20°,6 %\n30.5°,30°,7%\n",
         "theta_i;theta_view;M00\n[º];[º];[sr⁻¹]\n30;10;.05\n30;20;.06\n30.5;30;.07\n",
         "theta_i_deg,theta_view_deg,M00,M00\n30,10,0.05,0.05\n30,20,0.06,0.06\n30.5,30,0.07,0.07\n",
+        ",theta_i_deg,theta_view_deg,M00\n0,30,10,0.05\n1,30,20,0.06\n2,30.5,30,0.07\n",
+        "Unnamed: 0,\u03b8_i [\u00b0],theta_view_deg,BRDF [sr\u207b\u00b9]\n4,30,10,0.05\n5,30,20,0.06\n6,30.5,30,0.07\n",
         "date;theta_i_deg;theta_view_deg;M00\n01.02.2024;30;10;0,05\n01.02.2024;30;20;0,06\n02.02.2024;30,5;30;0,07\n",
     ],
 )
@@ -89,6 +91,18 @@ def test_minus_signs_of_typesetting(tmp_path):
         ("theta_i_deg,theta_view_deg,450,550,650\n30,10,0.05,0.06,0.07\n", "--columns 450=M00_450nm,550=M00_550nm,650=M00_650nm"),
         ("theta_i_deg,theta_view_deg,M00\ndeg,deg,counts\n30,10,0.05\n", r"M00 \[counts\] is not in 1/sr: give --columns M00=M00 with --quantity relative"),
         ("theta_i_deg,theta_view_deg,M00,M00\n30,10,0.05,0.06\n", "expected one column of M00, found M00 too. Remove one, or give it a name"),
+        ("theta_i_mrad,theta_view_mrad,M00\n523,174,0.05\n", r"got 'theta_i_mrad', 'theta_view_mrad'\. Say what they hold"),
+        ("theta_i_deg,theta_view_deg,counts\n30,10,500\n", "--columns counts=M00 with --quantity relative"),
+        ("theta_i_deg,theta_view_deg,ARS\n30,10,0.05\n", "--columns ARS=M00 with --quantity brdf-cos"),
+        ("theta_i_deg,theta_view_deg,R\n30,10,0.05\n", "--columns R=M00 with --quantity reflectance-factor"),
+        ("theta_i_deg,theta_view_deg,Rs,Rp\n30,10,0.05,0.04\n", "--columns Rs=I_s; that of a source polarised so"),
+        ("theta_i_deg,theta_view_deg,energy,M00\n30,10,1.96,0.05\n", "energy names no unit: head it energy_ev"),
+        ("theta_i_deg,theta_view_deg,wavenumber,M00\n30,10,1.96,0.05\n", "wavenumber names no unit"),
+        ("theta_i_deg,theta_view_deg,N,C,S\n30,10,0.1,0.1,0.1\n", "expected known columns, got 'N', 'C', 'S'"),
+        (f"{HEAD}30,10,0.05\n30,20,9999\n30,30,0.07\n", "line 3, column M00: expected a reading, got 9999 beside at most 0.07"),
+        (f"{HEAD}30,10,-1.5\n30,20,-1.4\n30,30,-1.2\n", "Of logarithms or decibels write the numbers themselves"),
+        (f"{HEAD}30,10,950\n30,20,870\n30,30,1.050\n30,40,1.120\n", "expected decimals or thousands, got '1.050' beside '950'"),
+        ("theta_i_deg,theta_view_deg,M00,\n30,10,0.05,7\n", "got 'column 4'"),
         ("theta_i_deg,theta_view_deg,M10,m10\n30,10,0.01,0.2\n", "expected one column of m10, found M10 too"),
         ("theta_i_deg,theta_view_deg,I0,I45,I90,I135,I0_stderr,I90_stderr\n30,10,3,2,1,2,0.1,0.1\n", "found no I45_stderr, I135_stderr. Give all four; .*I0_stderr=ignore,I90_stderr=ignore"),
     ],
@@ -109,6 +123,22 @@ def test_wavelengths_over_columns_with_errors(tmp_path):
     named = {f"{wave}": f"M00_{wave}nm" for wave in (450, 550, 650)}
     scan = read(tmp_path, text, columns=named)
     assert_allclose(scan.wavelength, [0.45, 0.55, 0.65])
+
+
+def test_a_reading_far_above_its_neighbours_is_found(tmp_path):
+    rows = "".join(f"30,{v},{5.0 if v == -20 else 0.05}\n" for v in range(-60, 61, 10))
+    found = {one.name: one for one in check_scan(read(tmp_path, HEAD + rows))}
+    assert found["spike"].severity == "warning"
+    assert "5 at view -20 deg" in found["spike"].what
+    lobe = "".join(f"30,{v},{5.0 if v == 30 else 0.05}\n" for v in range(-60, 61, 10))
+    assert "spike" not in {one.name for one in check_scan(read(tmp_path, HEAD + lobe))}
+
+
+def test_cosines_show_at_views_that_are_far_apart(tmp_path):
+    cosine = {v: np.cos(np.radians(v)) for v in range(-60, 61, 15)}
+    rows = "".join(f"{i},{v},{0.1 * c}\n" for i in (30, 60) for v, c in cosine.items())
+    found = check_scan(read(tmp_path, HEAD + rows))[0]
+    assert (found.name, found.severity) == ("reciprocity", "error")
 
 
 def polarised(noise=0.0, rows=30, **wrong):

@@ -133,6 +133,7 @@ def require_one_notation(
             if _COMMA.fullmatch(cell):
                 comma = comma or (name, lines[row], cell)
                 decimal = decimal or not THOUSANDS.fullmatch(cell)
+        _refuse_points_of_thousands(path, name, text, lines)
         if point is None:
             points = text.str.fullmatch(_POINT).to_numpy(bool)
             point = text.iloc[int(points.argmax())] if points.any() else None
@@ -148,6 +149,25 @@ def require_one_notation(
     problem = f"expected decimal commas or thousands, got {cell!r}{beside} for either"
     cure = "Write decimals with a point, and nothing between thousands."
     raise DataFileError(path, problem, cure, line=line, column=name)
+
+
+def _refuse_points_of_thousands(
+    path: Path, name: str, text: pd.Series, lines: Sequence[int]
+) -> None:
+    """Refuse 1.234 beside 950: no number has another count of decimals, none is below 1."""
+    dotted = text.str.fullmatch(r"[-+]?[1-9]\d{0,2}\.\d{3}").to_numpy(bool)
+    whole = text.str.fullmatch(r"[-+]?[1-9]\d{2}").to_numpy(bool)
+    if min(dotted.sum(), whole.sum()) < 2 or not (
+        (dotted | whole).sum() > 0.9 * (text.str.len() > 0).sum()
+    ):
+        return
+    row = int(dotted.argmax())
+    problem = (
+        f"expected decimals or thousands, got {text.iloc[row]!r} beside "
+        f"{text.iloc[int(whole.argmax())]!r}"
+    )
+    cure = "Write nothing between thousands, and decimals in every number or in none."
+    raise DataFileError(path, problem, cure, line=lines[row], column=name)
 
 
 def without_empty_end(row: list[str], width: int) -> list[str]:

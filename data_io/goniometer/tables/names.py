@@ -50,6 +50,7 @@ TARGETS = (
 _ANGLE_UNITS = {"deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "º": "deg",
                 "rad": "rad",
                 "radian": "rad", "radians": "rad", "grad": None}  # fmt: skip
+_GREEK = {"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "δ": "delta "}
 _IN_BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$")
 _DIVIDED = re.compile(r"^[Mm](\d\d)\s*/\s*[Mm]00$|^[Mm](\d\d)_norm(?:alised|alized)?$")
 # M00_450nm, 450 nm, brdf_stderr_650nm
@@ -110,7 +111,7 @@ def meaning_of(name: str) -> Meaning | None:
     if found:
         return found
     spectral = column_of(name)
-    if spectral and spectral.role == "wavelength" and _is_spectral(name):
+    if spectral and spectral.role == "wavelength" and _is_spectral(name, spectral.unit):
         return Meaning("wavelength", spectral.unit)
     value = _value(plain, bracket)
     if value:
@@ -145,6 +146,8 @@ def _split(name: str) -> tuple[str, str]:
 
 def _angle(plain: str, bracket: str) -> Meaning | None:
     words = re.sub(r"[\s_]+", " ", plain).strip().lower()
+    for letter, spelled in _GREEK.items():
+        words = words.replace(letter, spelled)
     unit = bracket.lower() or None
     last = words.rpartition(" ")[2]
     if last in _ANGLE_UNITS and " " in words:
@@ -170,8 +173,10 @@ def _value(plain: str, bracket: str) -> Meaning | None:
     return Meaning(known, "%" if bracket == "%" else None, stderr)
 
 
-def _is_spectral(name: str) -> bool:
+def _is_spectral(name: str, unit: str | None) -> bool:
     # "E", "e" and "nu" head other things in tables of light
     plain = _split(name)[0].lower()
-    heads = ("wave", "wl", "lambda", "λ", "energy", "photon", "frequency")
-    return plain.startswith(heads) or unit_of(name) is not None
+    if plain.startswith(("wavelength", "wl", "lambda", "λ", "vacuum")):
+        return True
+    heads = ("wave", "energy", "photon", "frequency")
+    return (unit is not None and plain.startswith(heads)) or unit_of(name) is not None

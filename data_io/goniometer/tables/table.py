@@ -157,6 +157,7 @@ def read_table(path: Path, lines: Sequence[Line]) -> RawTable:
     if between:
         names = _with_units(names, heads[1])
     cells = pd.DataFrame([row for _, row in rows], dtype=str)
+    names, cells = _without_counter(names, cells)
     return RawTable(
         names=_with_signs(names, cells),
         cells=cells,
@@ -204,6 +205,25 @@ def _rows(
             raise DataFileError(path, problem, cure, line=line.number)
         rows.append((line, row))
     return rows, words
+
+
+def _without_counter(
+    names: Sequence[str], cells: pd.DataFrame
+) -> tuple[list[str], pd.DataFrame]:
+    """Take out a first column without a name that counts the rows; number other ones.
+
+    Tables of pandas have such a column.
+    """
+    first = pd.to_numeric(cells.iloc[:, 0], errors="coerce").to_numpy(float)
+    nameless = not names[0] or re.fullmatch(r"Unnamed: \d+", names[0])
+    if (
+        nameless
+        and len(names) > 1
+        and (first[:1] % 1 == 0).all()
+        and ((first - first[:1] == range(len(first))).all())
+    ):
+        names, cells = names[1:], cells.iloc[:, 1:]
+    return [name or f"column {k}" for k, name in enumerate(names, 1)], cells
 
 
 def _with_units(names: Sequence[str], below: Sequence[str]) -> list[str]:

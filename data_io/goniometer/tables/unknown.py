@@ -9,6 +9,7 @@ from data_io.goniometer.scan import STDERR
 from data_io.goniometer.tables.names import ANGLES, TARGETS, bare_name, meaning_of
 from data_io.goniometer.tables.table import RawTable
 from pbrdf.errors import DataFileError
+from pbrdf.optics.published.columns import column_of
 
 __all__ = ["COLUMNS_CURE", "unknown_columns"]
 
@@ -24,6 +25,17 @@ _SUGGESTED = tuple(t for t in TARGETS if t.startswith(("theta", "wavelength", "s
 _ERROR_WORDS = re.compile(
     r"^u\((.+)\)$|^(.*?)[\s_-]*(?:err|error|unc|uncertainty|sigma|std)$"
 )
+_OTHER_UNIT = re.compile(r"[\s_\[(](?:[mu]rad|mdeg|gon|grad|arcmin|arcsec)\b")
+_ALONG = re.compile(r"^(?:[RrFfIiPp]|[Rr]efl|BRDF|brdf)[\s_]*([sp])$|^([sp])$")
+_COUNTS = re.compile(
+    r"^(?:raw|norm\w*|rel\w*)?[\s_]*(?:intensity|counts?|cts|signal|power|voltage|radiance|"
+    r"detector|current|flux)\b", re.IGNORECASE,
+)  # fmt: skip
+_WITH_COSINE = re.compile(
+    r"^(?:ars|dsd|ccbrdf|ccbsdf|cos\w*[\s_-]*corr\w*[\s_-]*bs?r?df)$", re.IGNORECASE
+)
+_REFLECTANCE = re.compile(r"^(?:r|refl|reflectance|reflectivity)$", re.IGNORECASE)
+_SPECTRAL = re.compile(r"^(?:photon[\s_]*)?energy$|^wave[\s_]*numbers?$|^frequency$", re.I)
 _FROM_ONE = re.compile(r"^m(?:4[1-4]|[1-3]4|[1-4]{2}/m11)$", re.IGNORECASE)
 
 
@@ -31,7 +43,8 @@ def unknown_columns(
     path: Path, table: RawTable, unknown: Sequence[str], without_unit: Sequence[str]
 ) -> DataFileError:
     """Return the error that names every column without a meaning or a unit."""
-    if "n" in map(str.lower, unknown) and not without_unit:
+    constants = "n" in map(str.lower, unknown) and all(map(column_of, unknown))
+    if constants and not without_unit:
         problem = f"expected a scan, got columns {', '.join(map(repr, unknown))}"
         cure = "Optical constants are given by --material-file, material_file= or file =."
         raise DataFileError(path, problem, cure, line=table.header)
@@ -56,7 +69,8 @@ def _cures(unknown: Sequence[str], without_unit: Sequence[str]) -> list[str]:
             pairs.append(f"{name}={meaning.name}_deg")
         else:
             pairs += [f"{name}={target}" for target in _close_to(name)]
-    cures += [text for name in unknown if (text := _of_unit(name))]
+    for hint in (_of_unit, _of_other_quantity):
+        cures += [text for name in unknown if (text := hint(name))]
     waves = [f"{name}=M00_{size}" for name in unknown if (size := _as_wavelength(name))]
     if waves:
         cures.append(f"Where wavelengths head columns, give --columns {','.join(waves)}.")
@@ -77,6 +91,8 @@ def _close_to(name: str) -> list[str]:
     spelled = {_letters(target): target for target in TARGETS}
     if _letters(name) in spelled:
         return [spelled[_letters(name)]]
+    if _OTHER_UNIT.search(name.lower()):
+        return []
     error = _ERROR_WORDS.match(name.lower())
     if error:
         value = meaning_of(error[1] or error[2] or "M00")
@@ -100,6 +116,36 @@ def _of_unit(name: str) -> str:
         f"{name} is not in 1/sr: give --columns {bare}={bare} with --quantity relative, or "
         "what it is."
     )
+
+
+def _of_other_quantity(name: str) -> str:
+    """Return how to say what a usual name of another quantity holds, or nothing.
+
+    >>> _of_other_quantity("counts [1/s]")
+    'counts has no absolute scale: --columns counts=M00 with --quantity relative.'
+    """
+    bare = bare_name(name)
+    along = _ALONG.match(bare)
+    if along:
+        letter = along[1] or along[2]
+        return (
+            f"Light of an unpolarised source behind an analyser along {letter} is "
+            f"--columns {bare}=I_{letter}; that of a source polarised so is none of these."
+        )
+    if _COUNTS.match(bare):
+        return (
+            f"{bare} has no absolute scale: --columns {bare}=M00 with --quantity relative."
+        )
+    if _WITH_COSINE.match(bare):
+        return f"Times cos(theta_s) it is --columns {bare}=M00 with --quantity brdf-cos."
+    if _REFLECTANCE.match(bare):
+        return (
+            f"If {bare} is pi times the BRDF, --columns {bare}=M00 with --quantity "
+            "reflectance-factor."
+        )
+    if _SPECTRAL.match(bare):
+        return f"{bare} names no unit: head it energy_ev, wavenumber_cm-1 or frequency_thz."
+    return ""
 
 
 def _as_wavelength(name: str) -> str:

@@ -14,7 +14,7 @@ from pbrdf.optics.dispersion import Dispersion, Table
 from pbrdf.optics.materials import Material
 from pbrdf.optics.published.database import read_database_entry
 from pbrdf.optics.published.package import PREFIX, read_by_name
-from pbrdf.optics.published.tables import Block, read_blocks
+from pbrdf.optics.published.tables import IGNORED, Block, read_blocks
 from pbrdf.optics.published.text import read_text
 from pbrdf.optics.published.transparency import TRANSPARENT, warn_if_absorbing
 
@@ -187,15 +187,7 @@ def _constants(path: Path, block: Block) -> dict[str, Table]:
     _check_plausible(path, block, waves)
     order = np.argsort(waves, kind="stable")
     waves = waves[order]
-    twice = np.flatnonzero(np.diff(waves) <= 0)
-    if twice.size:
-        row = int(order[twice[0] + 1])
-        value = block.values("wavelength")[row]  # type: ignore[index]
-        problem = f"expected rising or falling wavelengths, got {value:g} twice"
-        cure = "Drop the repeated row."
-        raise DataFileError(
-            path, problem, cure, line=block.lines[row], column=spectral.name
-        )
+    _refuse_twice(path, block, waves, order)
     columns = {
         role: np.asarray(values)[order]
         for role in ("n", "kappa", "eps1", "eps2", "diffuse_albedo")
@@ -227,6 +219,25 @@ def _constants(path: Path, block: Block) -> dict[str, Table]:
         return {role: Table.of(role, waves, values) for role, values in columns.items()}
     except ValueError as error:
         raise DataFileError(path, str(error).rstrip("."), "Mend the table.") from error
+
+
+def _refuse_twice(path: Path, block: Block, waves: np.ndarray, order: np.ndarray) -> None:
+    """Refuse a wavelength that stands in two rows."""
+    twice = np.flatnonzero(np.diff(waves) <= 0)
+    if twice.size:
+        row = int(order[twice[0] + 1])
+        value = block.values("wavelength")[row]  # type: ignore[index]
+        problem = f"expected rising or falling wavelengths, got {value:g} twice"
+        cure = "Drop the repeated row."
+        if any(column.role == IGNORED for column in block.columns):
+            cure = "Keep one value of what is left out, or drop the repeated row."
+        raise DataFileError(
+            path,
+            problem,
+            cure,
+            line=block.lines[row],
+            column=block.column("wavelength").name,
+        )
 
 
 def _check_plausible(path: Path, block: Block, waves: np.ndarray) -> None:

@@ -15,7 +15,8 @@ _COMMENT = ("#", "%", ";", "!", "//")
 _CURE = (
     "Known: wavelength_nm, wavelength_um, energy_ev or wavenumber_cm-1; n; kappa, k or "
     "extinction; eps1, eps2; diffuse_albedo. Rename what has another name; leave the rest "
-    "out, --material-ignore NAME, ignore=['NAME'], or ignore = ['NAME'] in a scene."
+    "out, --material-ignore NAME, ignore=['NAME'], or ignore = ['NAME'] in a scene. "
+    "Remarks begin with #."
 )
 # What a column holds that is left out
 IGNORED = "ignored"
@@ -116,8 +117,11 @@ def _headed(
 
 
 def _is_row(line: Line) -> bool:
-    """Tell whether a line holds numbers: at least its first cell is one."""
-    return number(cells_of(line.text, separator_of(line.text))[0]) is not None
+    """Tell whether a line holds numbers: its first cell, or most of them."""
+    cells = [cell for cell in cells_of(line.text, separator_of(line.text)) if cell]
+    numbers = [number(cell) is not None for cell in cells]
+    named = cells[:1] and (unit_of(cells[0]) or column_of(cells[0]))
+    return any(numbers[:1]) or (2 * sum(numbers) > len(numbers) and not named)
 
 
 def _is_units(line: Line) -> bool:
@@ -125,7 +129,7 @@ def _is_units(line: Line) -> bool:
     cells = cells_of(line.text, separator_of(line.text))
     others = [cell for cell in cells if unit_of(cell) is None]
     return len(others) < len(cells) and all(
-        number(cell) is None and column_of(cell) is None for cell in others
+        cell == "1" or (number(cell) is None and column_of(cell) is None) for cell in others
     )
 
 
@@ -147,8 +151,11 @@ def _columns(
         pairs = zip(cells, below, strict=False)
         cells = [f"{name} [{u.strip('[]()')}]" if unit_of(u) else name for name, u in pairs]
     found = [
-        Column(cell, IGNORED) if {cell, _bare(cell)} & {*ignore} else column_of(cell)
-        for cell in cells
+        # A first column without a name counts the rows, as in tables of pandas
+        Column(cell, IGNORED)
+        if {cell, _bare(cell)} & {*ignore} or (not cell and k == 0)
+        else column_of(cell)
+        for k, cell in enumerate(cells)
     ]
     unknown = [cell for cell, column in zip(cells, found, strict=True) if column is None]
     if unknown:
@@ -202,7 +209,7 @@ def _rows(
             value = number(cell)
             if value is None or not _allowed(column.role, value):
                 problem = f"expected a finite number >= 0, got {cell!r}"
-                cure = "The index is n + i kappa with kappa >= 0 absorbing."
+                cure = _cure_of(cell, value)
                 if column.role == "eps1":
                     problem = f"expected a finite number, got {cell!r}"
                 raise DataFileError(
@@ -212,9 +219,22 @@ def _rows(
         block.rows.append(row)
         block.lines.append(line.number)
     if not block.rows:
-        problem, cure = "expected rows of numbers, got none", "The file is truncated."
+        problem = "expected rows of numbers, got none"
+        cure = "The file is truncated, or units stand behind its numbers."
         raise DataFileError(path, problem, cure)
     return block
+
+
+def _cure_of(cell: str, value: float | None) -> str:
+    """Return what to do about a cell that is no constant."""
+    if value is not None and value < 0.0:
+        return (
+            "The index is n + i kappa with kappa >= 0 absorbing: of n - i k, and of eps1 - "
+            "i eps2, write the second without its sign."
+        )
+    if re.search(r"\d\s*\*?\s*[ij]\)?$", cell):
+        return "Give the real and the imaginary part of a complex number a column each."
+    return "Leave rows with a gap out, or give each constant a table of its own."
 
 
 def _allowed(role: str, value: float) -> bool:

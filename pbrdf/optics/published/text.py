@@ -13,6 +13,7 @@ __all__ = ["Line", "cells_of", "number", "read_text", "separator_of"]
 # Far beyond any table of optical constants
 _LARGEST = 50_000_000
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
+_DECIMAL = re.compile(r"[-+]?\d+(?:,\d+)?(?:[eE][-+]?\d+)?")
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 
 
@@ -51,6 +52,11 @@ def read_text(file: Path | Traversable, shown: Path) -> str:
 def _encodings(content: bytes) -> tuple[str, ...]:
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return ("utf-16",)
+    if b"\x00" in content:
+        # Plain text in UTF-16 has a zero for nearly every other byte
+        return ("utf-16-le",) if content[1::2].count(0) > content[::2].count(0) else (
+            "utf-16-be",
+        )  # fmt: skip
     return "utf-8-sig", "cp1252"
 
 
@@ -59,9 +65,9 @@ def separator_of(text: str) -> str | None:
     found = next((mark for mark in (";", "\t") if mark in text), None)
     if found or "," not in text:
         return found
-    # "0,4 1,5 0,01": the commas are decimal ones
+    # "400 1,5 0,01": the commas are decimal ones
     words = text.split()
-    return None if len(words) > 1 and all(map(_DECIMAL_COMMA.fullmatch, words)) else ","
+    return None if len(words) > 1 and all(map(_DECIMAL.fullmatch, words)) else ","
 
 
 def cells_of(text: str, separator: str | None) -> list[str]:
