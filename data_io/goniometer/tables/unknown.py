@@ -26,7 +26,7 @@ _ERROR_WORDS = re.compile(
     r"^u\((.+)\)$|^(.*?)[\s_-]*(?:err|error|unc|uncertainty|sigma|std)$"
 )
 _OTHER_UNIT = re.compile(r"[\s_\[(](?:[mu]rad|mdeg|gon|grad|arcmin|arcsec)\b")
-_ALONG = re.compile(r"^(?:[RrFfIiPp]|[Rr]efl|BRDF|brdf)[\s_]*([sp])$|^([sp])$")
+_ALONG = re.compile(r"^(?:[RrIiPp]|[Rr]efl|BRDF|brdf)[\s_]*([sp])$|^([sp])$")
 _COUNTS = re.compile(
     r"^(?:raw|norm\w*|rel\w*)?[\s_]*(?:intensity|counts?|cts|signal|power|voltage|radiance|"
     r"detector|current|flux)\b", re.IGNORECASE,
