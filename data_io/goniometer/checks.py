@@ -120,7 +120,7 @@ def _check_values(scan: Scan) -> None:
                 value = values[np.argmax(negative)]
                 problem = f"expected a value >= 0, got {value:.9g}"
                 cure = _negative_cure(name, value)
-                if negative.sum() > 0.5 * np.isfinite(values).sum():
+                if negative.sum() > max(0.5 * np.isfinite(values).sum(), 2.0):
                     cure = "Of logarithms or decibels write the numbers themselves."
                 raise scan.fault(negative, name, problem, cure)
         if name.endswith(STDERR) and name.removesuffix(STDERR) not in scan.values:
