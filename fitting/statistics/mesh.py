@@ -57,6 +57,14 @@ class MeshStatistics:
     tilt_share: np.ndarray
     warnings: tuple[str, ...]
 
+    def __str__(self) -> str:
+        lines = [
+            f"{entry.name:>18}  {getattr(self, entry.name)}"
+            for entry in fields(self)
+            if isinstance(getattr(self, entry.name), Estimate)
+        ]
+        return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings)])
+
     def to_frame(self) -> "pd.DataFrame":
         """Estimates as a table with one row each."""
         import pandas as pd

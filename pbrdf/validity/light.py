@@ -14,10 +14,10 @@ CURES = {
     "max_bounces, or look for heights that are no surface: a spike, a pit, a wrong unit",
     "leaked": "was lost by a fault of the tracing: the result lacks it, do not use it. "
     "Check the heights for steps out of proportion",
-    "left_sideways": "left the finite map sideways. Take a larger map, "
-    "HeightMap.mirrored(), or a steeper source",
-    "side_exits": "left the finite map sideways and is not counted. Take a larger map, "
-    "HeightMap.mirrored(), or a steeper source",
+    "left_sideways": "left the finite map sideways. Take a larger map or mesh, "
+    "HeightMap.mirrored(), a period of the mesh, or a steeper source",
+    "side_exits": "left the finite map sideways and is not counted. Take a larger map or "
+    "mesh, HeightMap.mirrored(), a period of the mesh, or a steeper source",
 }
 
 

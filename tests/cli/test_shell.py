@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import trimesh
 import typer
 import xarray as xr
 from numpy.testing import assert_allclose
@@ -45,7 +46,7 @@ def test_every_option_says_what_it_is_for():
     assert not silent
 
 
-@pytest.mark.parametrize("kind", [kind for kind in Kind if kind is not Kind.map])
+@pytest.mark.parametrize("kind", sorted(set(Kind) - {Kind.map, Kind.mesh}))
 def test_starter_scenes_are_scenes(kind, tmp_path, capsys):
     path = tmp_path / "scene.toml"
     assert main(["init", str(path), "--kind", kind.value]) == 0
@@ -62,6 +63,20 @@ def test_a_starter_map_takes_the_heights_beside_it(tmp_path):
     np.save(tmp_path / "heights.npy", np.random.default_rng(1).standard_normal((20, 30)))
     assert main(["init", str(tmp_path / "scene.toml"), "--kind", "map"]) == 0
     assert load_scene(tmp_path / "scene.toml").surface.heights.shape == (20, 30)
+
+
+def test_a_starter_mesh_takes_the_file_beside_it_and_all_that_it_remarks_on(tmp_path):
+    path = tmp_path / "scene.toml"
+    trimesh.creation.box((0.03, 0.03, 0.002)).export(tmp_path / "mesh.stl")
+    assert main(["init", str(path), "--kind", "mesh"]) == 0
+    assert load_scene(path).surface.kind == "bodies"
+    text = path.read_text()
+    for key in ("unit", "period_um", "labels"):
+        text = text.replace(f"# {key} =", f"{key} =")
+    path.write_text(text.replace("# transparent = [1]", "transparent = true"))
+    surface = load_scene(path).surface
+    assert_allclose(surface.size, (40.0, 40.0))
+    assert surface.transparent == (0,)
 
 
 def test_a_dash_is_standard_output(tmp_path, capsys):

@@ -6,7 +6,7 @@ import trimesh
 
 from fitting import surface_statistics
 from pbrdf import GaussianSurface, HeightMap, MeshSurface, morphologies
-from tests.meshes.shapes import joined, pair, plate
+from tests.meshes.shapes import joined, mushrooms, pair, plate
 
 ROUGH = GaussianSurface(shape=(96, 64), spacing=1.0, corr_length=(5.0, 8.0), slope_rms=0.3)
 
@@ -66,3 +66,10 @@ def test_what_is_no_surface_is_refused():
         surface_statistics(3.0)
     assert hasattr(surface_statistics(ROUGH.sample(0)), "corr_length")
     assert surface_statistics(MeshSurface.of_map(HeightMap.flat())).slope_rms.value == 0.0
+
+
+def test_statistics_of_a_mesh_print_as_a_table():
+    text = str(surface_statistics(mushrooms())).splitlines()
+    assert text[0].split()[0] == "area_ratio"
+    assert text[-1].startswith("warning: ")
+    assert len(text) == 7

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf import morphologies
+from pbrdf.errors import AccuracyWarning
 
 PERIOD = (14.0, 11.0)
 MADE = {
@@ -97,3 +98,10 @@ def test_flakes_have_the_slopes_asked_for():
 def test_arguments_are_checked(name, options, match):
     with pytest.raises(ValueError, match=match):
         getattr(morphologies, name)(**(MADE[name] | options))
+
+
+def test_coverage_that_whole_bodies_miss_is_warned_of():
+    with pytest.warns(AccuracyWarning, match=r"coverage is 0.349 with 1 bodies .* not 0.5"):
+        morphologies.spheres_on_plane(period=(3.0, 3.0), radius=1.0, coverage=0.5)
+    with pytest.raises(ValueError, match="period must be no less than a body is wide"):
+        morphologies.spheres_on_plane(period=(26.0, 8.0), radius=5.0, coverage=0.38)

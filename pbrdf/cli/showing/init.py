@@ -109,6 +109,22 @@ periodic = false
 n = 1.5
 """
 
+MESH = """\
+# A triangle mesh, overhangs included: STL, PLY, OBJ, GLB, glTF or OFF beside this file. z
+# points up. Numbers are micrometres unless a unit is named. Metals need --wavelength-um.
+
+[surface]
+type = "mesh"
+file = "mesh.stl"
+# unit = "mm"               # nm, um, mm, cm, m, inch: that of the numbers in the file
+# period_um = [40.0, 40.0]  # if it repeats; else it is a sheet, or bodies that stand alone
+# labels = "parts"          # a [[substrate]] for each part of the file, in its order
+# transparent = [1]         # labels of closed parts that light goes through, or true
+
+[substrate]
+n = 1.5
+"""
+
 
 class Kind(StrEnum):
     """What to start from."""
@@ -119,6 +135,7 @@ class Kind(StrEnum):
     dew = "dew"
     film = "film"
     map = "map"
+    mesh = "mesh"
 
 
 TEXTS = {
@@ -128,6 +145,7 @@ TEXTS = {
     Kind.dew: DEW,
     Kind.film: FILM,
     Kind.map: MAP,
+    Kind.mesh: MESH,
 }
 
 
@@ -150,7 +168,8 @@ def command(
         return
     with staged_file(file, force=force) as stage:
         stage.write_text(text, encoding="utf-8")
-    wave = " --wavelength-um 0.55" if "--wavelength-um" in text else ""
+    tabulated = "simulate with --wavelength-um" in text
+    wave = " --wavelength-um 0.55" if tabulated else ""
     typer.echo(f"Written: {file}")
     typer.echo(f"Next:    pbrdf simulate {file} --theta-i-deg 30,60{wave} -o result.nc")
     typer.echo("         pbrdf plot result.nc")

@@ -3,13 +3,14 @@
 All are opaque, periodic, and bodies may cut into each other: light sees their union.
 """
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import ConvexHull
 
-from pbrdf.errors import require
+from pbrdf.errors import AccuracyWarning, require
 from pbrdf.surface.mesh.surface import MeshSurface
 from pbrdf.surface.periodic import nearest
 
@@ -21,6 +22,8 @@ MOST_COVERAGE = 0.5
 MOST_TRIES = 200_000
 # Bodies stand this share of their size in the ground, so that they touch it
 SUNK = 1e-3
+# Whole bodies may cover so much more or less than asked for, by share of it
+UNLIKE = 0.1
 # Flakes float so high that those of so many rms tilts clear the plane
 MOST_TILTS = 3.0
 
@@ -55,7 +58,7 @@ def spheres_on_plane(
     size = _positive("radius", radius)
     share = _share("coverage", coverage, MOST_COVERAGE)
     rng = np.random.default_rng(seed)
-    count = max(round(share * lengths.prod() / (np.pi * size**2)), 1)
+    count = _count(share, lengths, np.pi * size**2)
     ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=size)
     points = np.asarray(ball.vertices)
     solids = [_plane(lengths)]
@@ -132,7 +135,7 @@ def fibres(
     share = _share("coverage", coverage, 20.0)
     heap = float(require("layers", layers, lambda v: v >= 1, "be 1 or more", "1 is flat."))
     rng = np.random.default_rng(seed)
-    count = max(round(share * lengths.prod() / (2.0 * size * long)), 1)
+    count = _count(share, lengths, 2.0 * size * long)
     rod = turned_body(np.array([size, size]), np.array([-long / 2, long / 2]), sections)
     lying = rod[0][:, [2, 0, 1]]
     solids = [_plane(lengths)]
@@ -177,7 +180,7 @@ def flakes(
         require("tilt_rms", tilt_rms, lambda v: (v >= 0) & (v < 3), "lie in [0, 3)", "0.1.")
     )
     rng = np.random.default_rng(seed)
-    count = max(round(share * lengths.prod() / (np.pi * size**2)), 1)
+    count = _count(share, lengths, np.pi * size**2)
     disc = turned_body(np.array([size, size]), np.array([0.0, thick]), sections)
     solids = [_plane(lengths)]
     lowest = size * min(MOST_TILTS * steep, 1.0) + thick
@@ -276,7 +279,7 @@ def grit(
         msg = f"corners must be 5 or more, got {corners}."
         raise ValueError(msg)
     rng = np.random.default_rng(seed)
-    count = max(round(share * lengths.prod() / (np.pi * size**2)), 1)
+    count = _count(share, lengths, np.pi * size**2)
     solids = [_plane(lengths)]
     for x, y in _apart(lengths, 2.0 * size, count, rng):
         points = rng.normal(size=(corners, 3))
@@ -339,6 +342,12 @@ def _apart(
     lengths: np.ndarray, distance: float, count: int, rng: np.random.Generator
 ) -> np.ndarray:
     """Random places (count, 2) of which no two images are nearer than a distance."""
+    if distance > lengths.min():
+        msg = (
+            f"period must be no less than a body is wide, {distance:g} um, got "
+            f"{lengths.tolist()}. Take a larger period or smaller bodies."
+        )
+        raise ValueError(msg)
     places = np.empty((count, 2))
     found = 0
     for _ in range(MOST_TRIES):
@@ -385,6 +394,19 @@ def _positive(name: str, value: float) -> float:
     return float(
         require(name, value, lambda v: (v > 0) & np.isfinite(v), "be positive [um]", "Um.")
     )
+
+
+def _count(share: float, lengths: np.ndarray, each: float) -> int:
+    """Whole number of bodies, each over an area, nearest to a coverage; warned if far."""
+    count = max(round(share * lengths.prod() / each), 1)
+    covered = count * each / lengths.prod()
+    if abs(covered - share) > UNLIKE * share:
+        note = (
+            f"coverage is {covered:.3g} with {count} bodies a period, not {share:.3g}. "
+            "Take a larger period, or smaller bodies."
+        )
+        warnings.warn(note, AccuracyWarning, stacklevel=3)
+    return count
 
 
 def _share(name: str, value: float, most: float) -> float:
