@@ -35,7 +35,12 @@ def in_options(sentence: str, options: Mapping[str, str]) -> str:
     >>> options = {"spacing": "--spacing-um"}
     >>> in_options("spacing must be > 0 um, got -1. Pass spacing=0.5.", options)
     '--spacing-um must be > 0 um, got -1. Pass --spacing-um 0.5.'
+    >>> in_options("Or: --columns x=ignore.", {"scan_columns": "--scan-columns"})
+    'Or: --scan-columns x=ignore.'
     """
+    if "--scan-columns" in options.values():
+        # Beside a surface, which has columns too; those of a scan are given meanings
+        sentence = re.sub(r"--columns (?=[^=.;:]{1,60}=)", "--scan-columns ", sentence)
     for name, option in sorted(options.items(), key=lambda pair: -len(pair[0])):
         # A dash or letter before it: the name is part of another word
         sentence = re.sub(rf"(?<![\w-]){name}=(?=[\w'\"(\[])", f"{option} ", sentence)

@@ -271,4 +271,4 @@ def _check_plausible(path: Path, block: Block, waves: np.ndarray) -> None:
             f"{path.name}: wavelengths of {low:g} to {high:g} um lie beyond the infrared; "
             f"they may be nanometres. Then head the column wavelength_nm."
         )
-        warnings.warn(msg, AccuracyWarning, stacklevel=4)
+        warnings.warn(msg, AccuracyWarning, stacklevel=5)

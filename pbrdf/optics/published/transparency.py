@@ -76,7 +76,7 @@ def warn_if_absorbing(name: str, n: Any, *, stacklevel: int = 3) -> None:
             f"{doubt}. Give a column kappa (or k), or the number kappa beside it, 0 for "
             "a medium that is clear."
         )
-        warnings.warn(msg, AccuracyWarning, stacklevel=stacklevel + 1)
+        warnings.warn(msg, AccuracyWarning, stacklevel=stacklevel)
 
 
 def _sampled(n: Any) -> tuple[np.ndarray, np.ndarray]:
