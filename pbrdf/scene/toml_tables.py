@@ -30,6 +30,11 @@ MATERIAL_KEYS = {
 def required(document: Mapping[str, Any], name: str, source: Path) -> dict[str, Any]:
     """Return a table of the document that must be there."""
     table = document.get(name)
+    if isinstance(table, list):
+        cure = f"Write [{name}]"
+        if name == "substrate":
+            cure += ", several as materials = [{n = 1.5}, {n = 1.3}] in it"
+        raise DataFileError(source, f"{name!r} is a list of tables", f"{cure}.")
     if not isinstance(table, dict):
         raise DataFileError(source, f"has no table [{name}]", "A scene needs it.")
     return dict(table)

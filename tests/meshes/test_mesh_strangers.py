@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import trimesh
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
-from pbrdf import Material, MeshSurface, Scene, simulate
+from pbrdf import Material, MeshSurface, Scene, load_scene, simulate
 from pbrdf.errors import AccuracyWarning, DataFileError
 from tests.meshes.shapes import plate
 
@@ -23,6 +23,74 @@ def test_parts_of_a_scene_are_numbered_in_the_order_of_the_file(tmp_path):
             corners = mesh.vertices[mesh.faces[mesh.labels == number]]
             assert_allclose(corners[..., 0].mean(), 9.0 * number, atol=0.6)
             assert_allclose(np.ptp(corners[..., 0]), 1.0 + number, atol=1e-5)
+
+
+OBJ = """\
+v 0 0 0
+v 4 0 0
+v 4 4 0
+v 0 4 0
+v 2 0 1
+v 2 4 1
+o roof
+usemtl zinc
+f 1 5 6
+usemtl asphalt
+f 5 2 3 6
+usemtl zinc
+f 1 6 4
+o kiosk
+v 4 0 0
+v 8 0 0
+v 8 4 0
+v 4 4 0
+usemtl asphalt
+f 7 8 9 10
+"""
+PLY = """\
+ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+element face {faces}
+property list uchar int vertex_indices
+property int label
+end_header
+0 0 0
+4 0 0
+4 4 0
+0 4 0
+"""
+
+
+def test_objects_and_materials_of_an_obj_file_are_its_parts_in_their_order(tmp_path):
+    (tmp_path / "roof.obj").write_text(OBJ)
+    mesh = MeshSurface(tmp_path / "roof.obj", (8.0, 4.0), labels="parts")
+    middle = mesh.vertices[mesh.faces].mean(axis=1)[:, 0]
+    # Zinc on the left of the roof, asphalt on its right, then asphalt of the kiosk
+    expected = np.where(middle < 2.0, 0, np.where(middle < 4.0, 1, 2))
+    assert_array_equal(mesh.labels, expected)
+    assert sorted(expected) == [0, 0, 1, 1, 2, 2]
+
+
+def test_labels_of_faces_in_a_ply_file_are_its_parts(tmp_path):
+    path = tmp_path / "plate.ply"
+    path.write_text(PLY.format(faces=2) + "3 0 1 2 1\n3 0 2 3 0\n")
+    assert_array_equal(MeshSurface(path, (4.0, 4.0), labels="parts").labels, [1, 0])
+    assert MeshSurface(path, (4.0, 4.0)).labels is None
+    path.write_text(PLY.format(faces=1) + "4 0 1 2 3 1\n")
+    assert MeshSurface(path, (4.0, 4.0)).labels is None
+    with pytest.raises(DataFileError, match=r"a file that numbers polygons\. Cut them"):
+        MeshSurface(path, (4.0, 4.0), labels="parts")
+
+
+def test_a_scene_file_says_how_several_materials_are_written(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text("[surface]\n[[substrate]]\nn = 1.5\n[[substrate]]\nn = 1.3\n")
+    with pytest.raises(DataFileError, match=r"is a list of tables. .*materials = \[\{n"):
+        load_scene(path)
 
 
 def test_a_file_far_from_its_origin_is_warned_of(tmp_path):

@@ -118,11 +118,12 @@ type = "mesh"
 file = "mesh.stl"
 # unit = "mm"               # nm, um, mm, cm, m, inch: that of the numbers in the file
 # period_um = [40.0, 40.0]  # if it repeats; else it is a sheet, or bodies that stand alone
-# labels = "parts"          # a [[substrate]] for each part of the file, in its order
+# labels = "parts"          # numbers the parts of the file, each with a material below
 # transparent = [1]         # labels of closed parts that light goes through, or true
 
 [substrate]
 n = 1.5
+# or a list in the order of the labels: materials = [{n = 1.5}, {material = "aluminium"}]
 """
 
 

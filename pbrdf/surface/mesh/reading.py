@@ -12,6 +12,8 @@ from pbrdf.surface.mesh.promises import check_promises
 FORMATS = (".stl", ".ply", ".obj", ".glb", ".gltf", ".off")
 # Arrays `vertices`, `faces` and perhaps `labels`, in float64
 OWN_FORMAT = ".npz"
+# Face properties of a PLY file that number its parts
+FACE_LABELS = ("label", "labels", "part", "material", "material_index")
 # Micrometres in a unit
 UNITS = {"nm": 1e-3, "um": 1.0, "mm": 1e3, "cm": 1e4, "m": 1e6, "inch": 25400.0}
 # What trimesh calls them
@@ -22,11 +24,14 @@ _OTHER_NAMES = {
 
 
 class Raw(NamedTuple):
-    """Vertices, faces, part of a file that each face comes from, unit, labels if known."""
+    """Vertices, faces, part of a file that each face comes from, unit, labels if known.
+
+    Of parts nothing is known where a file labels polygons that were cut into triangles.
+    """
 
     vertices: np.ndarray
     faces: np.ndarray
-    parts: np.ndarray
+    parts: np.ndarray | None
     unit: str | None
     labels: np.ndarray | None = None
 
@@ -54,7 +59,11 @@ def read_mesh_file(path: Path) -> Raw:
             return _own(path)
         import trimesh
 
-        raw = _raw_of(trimesh.load(path, process=False))
+        obj = suffix == ".obj"
+        more: dict[str, Any] = {"split_objects": True} if obj else {}
+        loaded = trimesh.load(path, process=False, **more)
+        # Of OBJ trimesh takes the parts from the last one on
+        raw = _raw_of(loaded, backwards=obj)
     except Exception as error:
         # Its readers fail in every way that a damaged file can make an array fail
         reason = f"{type(error).__name__}: {error}"[:200]
@@ -78,14 +87,14 @@ def _own(path: Path) -> Raw:
         return Raw(arrays["vertices"], faces, parts, None, labels)
 
 
-def _raw_of(loaded: Any) -> Raw | None:
+def _raw_of(loaded: Any, *, backwards: bool = False) -> Raw | None:
     """Take a Trimesh, or a scene of several, apart; None of anything else."""
     if hasattr(loaded, "geometry"):
         pieces = []
         # The nodes of a graph come in an order of their own, not that of the file
-        order = {name: number for number, name in enumerate(loaded.geometry)}
+        names = list(loaded.geometry)[:: -1 if backwards else 1]
         nodes = sorted(
-            loaded.graph.nodes_geometry, key=lambda node: order[loaded.graph[node][1]]
+            loaded.graph.nodes_geometry, key=lambda node: names.index(loaded.graph[node][1])
         )
         for node in nodes:
             transform, name = loaded.graph[node]
@@ -106,7 +115,18 @@ def _raw_of(loaded: Any) -> Raw | None:
     if not hasattr(loaded, "faces"):
         return None
     faces = np.asarray(loaded.faces)
-    return Raw(np.asarray(loaded.vertices), faces, np.zeros(len(faces), int), loaded.units)
+    return Raw(np.asarray(loaded.vertices), faces, _face_labels(loaded), loaded.units)
+
+
+def _face_labels(loaded: Any) -> np.ndarray | None:
+    """Numbers of faces that a PLY file holds, else 0; None if they are not of triangles."""
+    raw = loaded.metadata.get("_ply_raw", {}).get("face", {}).get("data")
+    names = () if raw is None else getattr(raw, "dtype", np.dtype(int)).names or tuple(raw)
+    for name in FACE_LABELS:
+        if name in names:
+            numbers = np.asarray(raw[name]).ravel()
+            return numbers if len(numbers) == len(loaded.faces) else None
+    return np.zeros(len(loaded.faces), dtype=int)
 
 
 def raw_mesh(mesh: Any) -> Raw:

@@ -41,7 +41,9 @@ class MeshSurface:
         Periods lx, ly along x and y; all images of the mesh are there. Without it the mesh
         is alone: closed bodies in the open, or a sheet of which the rim is left out. [um]
     labels : array_like of shape (faces,) or "parts", optional
-        Number of the material of each face, or those of the parts of a file in their order.
+        Number of the material of each face, or those of the parts of a file in their order:
+        objects and materials of OBJ, meshes of GLB, solids of STL, a face property such as
+        `label` of PLY.
     unit : {"um", "nm", "mm", "cm", "m", "inch"}, optional
         Unit of the numbers in `mesh`; `period` stays in micrometres.
     transparent : bool or sequence of int
@@ -124,7 +126,9 @@ class MeshSurface:
             if not isinstance(mesh, str | Path):
                 raise
             problem, _, cure = str(error).rstrip(".").rpartition(". ")
-            raise DataFileError(Path(mesh), problem or cure, f"{cure}.") from error
+            if not problem:
+                problem, cure = cure, "Change that argument"
+            raise DataFileError(Path(mesh), problem, f"{cure}.") from error
         for note in (*doubts, *self.repairs):
             warnings.warn(note, AccuracyWarning, stacklevel=2)
 
@@ -139,6 +143,12 @@ class MeshSurface:
         vertices, faces = checked_arrays(raw.vertices, raw.faces)
         if _is_parts(labels):
             labels = raw.parts
+            if labels is None:
+                msg = (
+                    'labels must be numbers, got "parts" of a file that numbers polygons. '
+                    "Cut them into triangles."
+                )
+                raise ValueError(msg)
         elif labels is None:
             labels = raw.labels
         numbers = _checked_labels(labels, len(faces))
