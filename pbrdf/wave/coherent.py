@@ -80,14 +80,21 @@ class MeanField:
     @property
     def doubt(self) -> float:
         """Largest amplitude by which the beam departs from the Kirchhoff factor."""
-        return float(np.exp(-self.exponent) * np.abs(self.departure).max())
+        changes = np.abs(np.r_[self.departure, self.cross])
+        return float(np.exp(-self.exponent) * changes.max())
 
     @property
     def jones(self) -> Array:
-        """Jones matrix of the mean field, (2, 2)."""
+        """Jones matrix of the mean field, (2, 2); no light gains by being turned."""
         r_s, r_p = self.amplitudes
-        p_to_s, s_to_p = np.exp(-self.exponent) * self.cross
-        return np.array([[r_s, p_to_s], [s_to_p, r_p]])
+        turned = self.cross / np.sqrt(1.0 + np.abs(self.cross) ** 4)
+        p_to_s, s_to_p = np.exp(-self.exponent) * turned
+        whole = np.array([[r_s, p_to_s], [s_to_p, r_p]])
+        if not turned.any():
+            return whole
+        most = max(np.abs(self.flat).max(), np.abs(self.amplitudes).max())
+        largest = np.linalg.svd(whole, compute_uv=False)[0]
+        return whole * min(1.0, most / max(largest, 1e-300))
 
     @property
     def retardance(self) -> float:

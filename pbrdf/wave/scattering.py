@@ -77,6 +77,7 @@ class Scattering:
         if not size:
             return out
         spreads = self._spreads(columns[3])
+        self._check_facets(spreads, columns[3])
         self._warn_of_slopes(columns[3])
         phases = self._retardance(columns) if retarded else np.zeros((2, size))
         moments = self._moments(2 * np.pi / columns[3].min())
@@ -159,6 +160,15 @@ class Scattering:
             limit = 4 * np.pi / float(wavelength[rows[0]])
             spreads[rows] = self.heights.spread(limit, self.dimensions)
         return spreads
+
+    def _check_facets(self, spreads: Array, wavelength: Array) -> None:
+        """Refuse facets where no roughness is coarse enough to tilt one."""
+        if self.method.orders == "slopes" and not spreads.min() > 0.0:
+            msg = (
+                f"method {self.name!r} must have roughness coarser than half the "
+                f"wavelength, got none at {wavelength[spreads.argmin()]:g} um. Take 'auto'."
+            )
+            raise ValueError(msg)
 
     def steepest(self, wavelength: Array) -> float:
         """Rms slope along the steepest azimuth, by the shortest wave. [1]"""

@@ -144,6 +144,13 @@ def test_faults_of_the_heights_are_named() -> None:
         WaveModel(
             glass, height_rms=0.1, corr_length=1.0, autocorrelation=lambda x: 1 / (1 + x)
         )
+    ripples = WaveModel(
+        glass, height_rms=0.1, method="geometric",
+        autocorrelation=lambda x: np.exp(-(x**2)) * np.cos(2 * x),
+    )  # fmt: skip
+    assert np.isfinite(ripples.brdf(0.1, 0.2, 0.3, 0.5)).all()
+    with pytest.raises(ValueError, match="must have roughness coarser than half the"):
+        ripples.brdf(0.1, 0.2, 0.3, 20.0)
     with pytest.warns(AccuracyWarning, match=r"rms slope 0\.\d+ exceeds 0.45"):
         WaveModel(glass, height_rms=0.4, corr_length=1.0).brdf(0.1, 0.2, 0.3, 0.5)
 

@@ -119,6 +119,15 @@ def test_the_beam_is_no_brighter_than_light(material) -> None:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", AccuracyWarning)
                 found = model.coherent(theta, wavelength)
+                rough = WaveModel(
+                    MATERIALS[material],
+                    height_rms=height,
+                    corr_length=(length, 0.4 * length),
+                )
+                turned = rough.coherent(theta, wavelength, phi_i=0.3)
+            assert (turned[:, 0, 0] <= 1.0 + 1e-12).all()
+            most = np.linalg.norm(turned[:, 0, 1:], axis=1) + turned[:, 0, 0]
+            assert (most <= 1.0 + 1e-12).all()
             assert np.isfinite(found).all()
             assert (found[:, 0, 0] + np.abs(found[:, 0, 1]) <= 1.0 + 1e-12).all()
     if material == "metal":
