@@ -55,7 +55,7 @@ JUDGED = {
     ),
     "interfaces": (
         "pbrdf/kernels/bodies/interfaces.py",
-        ["tests/contaminants/test_drops_exact.py", "-k", "prism"],
+        ["tests/contaminants/test_beam_matrices.py"],
     ),
     "scatter": (SCATTER, [PINS, "tests/fits/test_statistics_parts.py"]),
     "uncertainty": (
