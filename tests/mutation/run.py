@@ -51,7 +51,7 @@ JUDGED = {
     ),
     "bodies": (
         "pbrdf/kernels/bodies/bodies.py",
-        ["tests/contaminants/test_contaminant_laws.py", "-k", "slices"],
+        ["tests/contaminants/test_quadric_slabs.py"],
     ),
     "interfaces": (
         "pbrdf/kernels/bodies/interfaces.py",
