@@ -158,8 +158,10 @@ def test_kernels_without_a_branch_know_the_mirror():
         assert from_python(kernels.transmission_parts)(cosine, np.inf, 0.0) == (0, 0, 0)
         assert_allclose(transmission_mueller(cosine, np.inf), 0.0, atol=0)
         # The same branch as an index that is finite takes
-        finite = from_python(kernels.facet_elements)(cosine, sin2, 1.37, 7.62)
-        assert_allclose(finite[0], specular_mueller(cosine, 1.37, 7.62)[0, 0], rtol=1e-14)
+        for kappa in (0.0, 1.0, 7.62):
+            finite = from_python(kernels.facet_elements)(cosine, sin2, 1.37, kappa)
+            matrix = specular_mueller(cosine, 1.37, kappa)
+            assert_allclose(finite, matrix[[0, 0, 2, 3], [0, 1, 2, 2]], atol=1e-15)
 
 
 def test_an_interface_between_equal_media_is_none():
