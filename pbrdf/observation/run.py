@@ -49,8 +49,8 @@ NARROW_CONE = 0.15
 # More rays into the hemisphere than this need a decay with the bounces
 SAFE_SAMPLES = 2.0
 SAFE_DECAY = 0.8
-# Bounces that light is given by default
-MOST_BOUNCES = 64
+# Bounces that light is given by default: on a clean surface, and where bodies may catch it
+MOST_BOUNCES, MOST_EVENTS = 64, 1024
 # Narrower cones lose digits [rad]
 NARROW = 1e-4
 # Facets of a mesh that look up less than this are walls
@@ -69,7 +69,7 @@ def observe(  # noqa: PLR0913  (the public signature)
     n_rays: int = 100_000,
     realizations: int = 1,
     seed: int | None = 0,
-    max_bounces: int = MOST_BOUNCES,
+    max_bounces: int | None = None,
     hemisphere_samples: float = 2.0,
     sample_decay: float = 0.5,
     estimator: str = "facets",
@@ -98,8 +98,9 @@ def observe(  # noqa: PLR0913  (the public signature)
     realizations, seed, target_rel_error, wavelength, stokes, workers, progress
         As in `simulate`; target_rel_error looks at every geometry above a tenth of the
         brightest.
-    max_bounces : int
-        Paths are cut after so many bounces; what they still carry is `truncated`.
+    max_bounces : int, optional
+        Paths are cut after so many bounces; what they still carry is `truncated`. 64, or
+        1024 where light goes through bodies.
     hemisphere_samples, sample_decay : float
         Rays into the hemisphere above a point of a diffuse base: samples times decay to the
         power of the bounces before it, rounded at random. They change the noise only.
@@ -184,7 +185,7 @@ def observe(  # noqa: PLR0913  (the public signature)
         source=source,
         detector=detector,
         n_rays=run.rays_of_sample,
-        max_bounces=arguments.count("max_bounces", max_bounces, 1),
+        max_bounces=_most_bounces(max_bounces, through=through),
         estimator=arguments.one_of("estimator", estimator, ESTIMATORS),
         counts=estimator == COUNT
         or (estimator != "corners" and widest > NARROW_CONE * slope > 0.0),
@@ -243,6 +244,12 @@ def _angles(
         )
         raise ValueError(msg)
     return angles
+
+
+def _most_bounces(given: int | None, *, through: bool) -> int:
+    if given is None:
+        return MOST_EVENTS if through else MOST_BOUNCES
+    return arguments.count("max_bounces", given, 1)
 
 
 def _from_source(start: str) -> bool:

@@ -72,9 +72,7 @@ def command(
     n_rays: options.Bundles = 20_000,
     realizations: options.Realizations = 16,
     target: options.Target = None,
-    max_bounces: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Where paths are cut.")
-    ] = 64,
+    max_bounces: options.Bounces = None,
     hemisphere_samples: Annotated[
         float,
         typer.Option(min=0.1, max=1e4, help="Rays above a point of a diffuse base."),
