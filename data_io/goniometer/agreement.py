@@ -7,7 +7,7 @@ import numpy as np
 from data_io.goniometer.scan import NORMALISED, STDERR, Scan
 from data_io.goniometer.scatter import curve_keys, standard_errors
 
-__all__ = ["check_agreement", "check_fractions", "errors_of"]
+__all__ = ["check_agreement", "check_fractions", "check_parts", "errors_of"]
 
 # Two columns of one quantity may differ by rounding and calibration [M00]
 _TOLERANCE, _DOLP_TOLERANCE = 0.02, 0.05
@@ -28,8 +28,8 @@ _SUMS: dict[str, tuple[dict[str, float], ...]] = {
             {"f_ss": 0.5, "f_sp": 0.5, "f_ps": -0.5, "f_pp": -0.5}),
     "M01": ({"f_ss": 0.5, "f_sp": -0.5, "f_ps": 0.5, "f_pp": -0.5},),
     "M11": ({"f_ss": 0.5, "f_sp": -0.5, "f_ps": -0.5, "f_pp": 0.5},),
-    "I_s": ({"f_ss": 0.5, "f_sp": 0.5},),
-    "I_p": ({"f_ps": 0.5, "f_pp": 0.5},),
+    "I_s": ({"f_ss": 0.5, "f_sp": 0.5}, {"M00": 0.5, "M10": 0.5}),
+    "I_p": ({"f_ps": 0.5, "f_pp": 0.5}, {"M00": 0.5, "M10": -0.5}),
 }  # fmt: skip
 
 
@@ -83,6 +83,27 @@ def check_agreement(scan: Scan) -> None:
             "M10)/2, I_p = (M00 - M10)/2, and m10 = M10/M00."
         )
         raise scan.fault(np.arange(value.size) == worst, name, problem, cure)
+
+
+def check_parts(scan: Scan) -> None:
+    """Refuse light behind an analyser that is more than all light."""
+    if "M00" not in scan.values:
+        return
+    whole = scan.values["M00"]
+    floor = _DARK * float(np.nanmax(np.abs(whole), initial=0.0))
+    for name in ("I_s", "I_p"):
+        if name not in scan.values:
+            continue
+        error = _joint(scan, {name: 1.0, "M00": 1.0})
+        part = np.where(error > 0.0, _TOLERANCE, _UNKNOWN) * np.abs(whole)
+        beyond = scan.values[name] - whole > part + _FAR * error + floor
+        if beyond.any():
+            row = int(np.argmax(beyond))
+            problem = (
+                f"expected at most M00 = {whole[row]:.6g}, got {scan.values[name][row]:.6g}"
+            )
+            cure = "Behind an analyser is a part of all light: I_s + I_p = M00."
+            raise scan.fault(beyond, name, problem, cure)
 
 
 def _told_twice(

@@ -2,7 +2,12 @@
 
 import numpy as np
 
-from data_io.goniometer.agreement import check_agreement, check_fractions, errors_of
+from data_io.goniometer.agreement import (
+    check_agreement,
+    check_fractions,
+    check_parts,
+    errors_of,
+)
 from data_io.goniometer.scan import ELEMENTS, INTENSITIES, NORMALISED, STDERR, Scan
 from pbrdf.errors import DataFileError
 
@@ -28,6 +33,7 @@ def check(scan: Scan) -> None:
     check_fractions(scan)
     _check_ratios(scan)
     check_agreement(scan)
+    check_parts(scan)
 
 
 def _check_angles(scan: Scan) -> None:
@@ -54,7 +60,16 @@ def _check_angles(scan: Scan) -> None:
             if column == "theta_i":
                 cure = "theta_i is positive; signs belong to theta_view_deg or dphi_deg."
             raise scan.fault(wrong, column, problem, cure)
-    cure = "Write degrees: 1.5708 rad are 90 deg."
+    if not scan.angles_declared:
+        _refuse_radians(scan)
+
+
+def _refuse_radians(scan: Scan) -> None:
+    """Refuse angles that are radians by their looks, under names that say degrees."""
+    cure = (
+        "Write degrees: 1.5708 rad are 90 deg. Or give --angles rad; deg if they are so "
+        "small."
+    )
     small = max(scan.theta_i.max(), scan.theta_s.max()) < _RADIAN_LIMIT_DEG
     for column in ("theta_i", "theta_s"):
         values = getattr(scan, column)

@@ -56,6 +56,8 @@ class Scan:
         conversion also "reflectance-factor" and "brdf-cos".
     declares_quantity : bool
         The file itself says which.
+    angles_declared : bool
+        Whoever reads the file says the unit of its angles.
     names : mapping of str to str
         What the file calls the angles, for messages.
     attrs : mapping
@@ -74,6 +76,7 @@ class Scan:
     detector_half_angle: np.ndarray | None = None
     quantity: str = "brdf"
     declares_quantity: bool = False
+    angles_declared: bool = False
     names: Mapping[str, str] = field(default_factory=dict)
     attrs: Mapping[str, object] = field(default_factory=dict)
 

@@ -217,6 +217,13 @@ def _derived(scan: "xr.Dataset", name: str) -> np.ndarray:
     for others in _follows(name):
         if set(others) <= set(scan.data_vars):
             found |= np.logical_and.reduce([np.isfinite(scan[o].values) for o in others])
+    other = {"I_s": "I_p", "I_p": "I_s"}.get(name)
+    if other is not None and {"M00", "M10"} <= set(scan.data_vars):
+        # Without its counterpart light behind an analyser takes nothing from the elements
+        alone = np.isfinite(scan["M00"].values) & np.isfinite(scan["M10"].values)
+        if other in scan:
+            alone &= ~np.isfinite(scan[other].values)
+        found |= alone
     return found
 
 

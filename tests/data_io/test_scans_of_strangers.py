@@ -91,6 +91,9 @@ def test_minus_signs_of_typesetting(tmp_path):
         ("theta_i_deg,theta_view_deg,450,550,650\n30,10,0.05,0.06,0.07\n", "--columns 450=M00_450nm,550=M00_550nm,650=M00_650nm"),
         ("theta_i_deg,theta_view_deg,M00\ndeg,deg,counts\n30,10,0.05\n", r"M00 \[counts\] is not in 1/sr: give --columns M00=M00 with --quantity relative"),
         ("theta_i_deg,theta_view_deg,M00,M00\n30,10,0.05,0.06\n", "expected one column of M00, found M00 too. Remove one, or give it a name"),
+        ("theta_i_deg,theta_view_deg,M00,I_s\n30,10,0.05,0.03\n30,20,0.05,0.08\n", "line 3, column I_s: expected at most M00 = 0.05, got 0.08"),
+        ("theta_i_deg;theta_view_deg;M00\n30,10,0.05\n", "expected cells that ';' separates, as it does the names, got '30,10,0.05'"),
+        (f"{HEAD}1,0.5,0.05\n1,1,0.06\n", "Or give --angles rad; deg if they are so small"),
         ("theta_i_mrad,theta_view_mrad,M00\n523,174,0.05\n", r"got 'theta_i_mrad', 'theta_view_mrad'\. Say what they hold"),
         ("theta_i_deg,theta_view_deg,counts\n30,10,500\n", "--columns counts=M00 with --quantity relative"),
         ("theta_i_deg,theta_view_deg,ARS\n30,10,0.05\n", "--columns ARS=M00 with --quantity brdf-cos"),
@@ -123,6 +126,20 @@ def test_wavelengths_over_columns_with_errors(tmp_path):
     named = {f"{wave}": f"M00_{wave}nm" for wave in (450, 550, 650)}
     scan = read(tmp_path, text, columns=named)
     assert_allclose(scan.wavelength, [0.45, 0.55, 0.65])
+
+
+def test_small_degrees_are_degrees_where_that_is_said(tmp_path):
+    scan = read(tmp_path, f"{HEAD}1,0.5,0.05\n1,1,0.06\n", angles="deg")
+    assert_allclose(np.degrees(scan.theta_s), [0.5, 1.0])
+
+
+def test_the_wavelength_of_an_astm_header(tmp_path):
+    text = "TITLE x\n{}\nVARS theta_i,phi_i,theta_s,phi_s,BRDF\n30,0,20,180,0.05\n"
+    for line, wave in (("WAVELENGTH 633 nm", 0.633), ("Laser wavelength = 10.6 um", 10.6)):
+        assert_allclose(read(tmp_path, text.format(line)).wavelength, wave)
+    (tmp_path / "bare.txt").write_text(text.format("WAVELENGTH 0.633"))
+    with pytest.warns(ConventionWarning, match=r"0\.633 names no unit and is left out"):
+        assert "wavelength" not in read_goniometer(tmp_path / "bare.txt").coords
 
 
 def test_a_reading_far_above_its_neighbours_is_found(tmp_path):
@@ -177,6 +194,7 @@ def write(view, table, names, stderr=0.0):
         (("M00", "I_s", "I_p"), r"M00: expected I_s \+ I_p = "),
         (("M10", "I_s", "I_p"), "M10: expected I_s - I_p = "),
         (("M00", "M10", "m10"), "M10: expected m10 M00 = "),
+        (("I_s", "M00", "M10"), r"I_s: expected \(M00 \+ M10\)/2 = "),
         (("m10", "I_s", "I_p"), r"m10: expected \(I_s - I_p\)/\(I_s \+ I_p\) = "),
     ],
 )
@@ -202,4 +220,6 @@ def test_light_that_columns_tell_twice_counts_once(tmp_path):
     found = observe({"scan": scan})
     count = {name: int((found.name == name).sum()) for name in found.names}
     # Of the row without I_p the elements count, and I_s follows from them
-    assert count == {"I_s": 30, "I_p": 29, "M00": 1, "M10": 1}
+    assert count == {"I_s": 29, "I_p": 29, "M00": 1, "M10": 1}
+    scan = read(tmp_path, write(view, table, ("M00", "M10", "I_s")))
+    assert set(observe({"scan": scan}).names) == {"M00", "M10"}

@@ -5,18 +5,26 @@ that dphi = phi_s - phi_i. NUM_POINTS announces the rows.
 """
 
 import re
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from data_io.goniometer.declarations import Declared
-from data_io.goniometer.scan import Scan
+from data_io.goniometer.scan import ConventionWarning, Scan
 from data_io.goniometer.tables import own_csv
 from data_io.goniometer.tables.names import ANGLES, meaning_of
 from data_io.text.text import Line, is_number
 from pbrdf.errors import DataFileError
+from pbrdf.optics.published.columns import Column, unit_of
 
 # Names of what was read that do not say in which unit
 _UNDECLARED = {"intensity", "power", "signal", "counts"}
+_WAVELENGTH = re.compile(
+    r"\s*(?:LASER[ _])?WAVELENGTH\s*[=:]?\s*(\d+(?:\.\d+)?)\s*([^\s\d]\S*)?\s*$",
+    re.IGNORECASE,
+)
 
 
 NAME, TAKES = "astm", own_csv.TAKES
@@ -50,8 +58,27 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     scan = own_csv.read(path, [header, *table], declared)
     title = next((c.text.strip()[6:] for c in content if c.text.startswith("TITLE ")), "")
     keywords = "\n".join(line.text.strip() for line in content[:at])
-    attrs = {"format": "astm", "title": title.strip(), "comments": keywords}
-    return replace(scan, attrs=attrs)
+    own = {"format": "astm", "title": title.strip(), "comments": keywords}
+    wavelength = scan.wavelength
+    if wavelength is None:
+        wavelength = _wavelength(path, content[:at], len(scan.theta_i))
+    return replace(scan, attrs={**scan.attrs, **own}, wavelength=wavelength)
+
+
+def _wavelength(path: Path, header: list[Line], rows: int) -> np.ndarray | None:
+    """Return the wavelength that a keyword gives all rows, None without one. [um]"""
+    found = [match for line in header if (match := _WAVELENGTH.match(line.text))]
+    if not found:
+        return None
+    size, unit = float(found[0][1]), unit_of(found[0][2] or "")
+    if unit is None:
+        msg = (
+            f"{path.name}: the wavelength {size:g} names no unit and is left out: write "
+            "WAVELENGTH 633 nm."
+        )
+        warnings.warn(msg, ConventionWarning, stacklevel=4)
+        return None
+    return np.full(rows, Column("wavelength", "wavelength", unit).to_um([size])[0])
 
 
 def _name(path: Path, line: Line, word: str, declared: Declared) -> str:

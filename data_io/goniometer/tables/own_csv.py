@@ -85,6 +85,7 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
         detector_half_angle=columns.angles.get("detector_half_angle"),
         quantity=said or quantity or "brdf",
         declares_quantity=said is not None or quantity is not None,
+        angles_declared=declared.angles is not None,
         names={
             **columns.names,
             "theta_s": columns.names[detector],

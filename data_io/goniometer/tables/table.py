@@ -192,6 +192,14 @@ def _rows(
             warnings.warn(msg, ConventionWarning, stacklevel=6)
             words.append(line)
             continue
+        if len(said) == 1 < width and sum(map(is_plain, _apart(said[0]))) > 1:
+            mark = "spaces" if separator is None else repr(separator)
+            problem = (
+                f"expected cells that {mark} separates, as it does the names, got "
+                f"{shortened(line.text.strip(), 40)!r}"
+            )
+            cure = "Separate names and rows alike."
+            raise DataFileError(path, problem, cure, line=line.number)
         if not any(map(is_plain, said)) and not all(map(is_gap, said)):
             problem = f"expected a row of numbers, got {shortened(line.text.strip(), 60)!r}"
             cure = (
@@ -205,6 +213,11 @@ def _rows(
             raise DataFileError(path, problem, cure, line=line.number)
         rows.append((line, row))
     return rows, words
+
+
+def _apart(text: str) -> list[str]:
+    """Return the cells of a line by its own separator."""
+    return cells_of(text, separator_of(text))
 
 
 def _without_counter(
