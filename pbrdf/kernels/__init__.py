@@ -2,8 +2,9 @@
 
 Kernels know no strings, files, units or frames other than those of the conventions page.
 `jit` compiles them and keeps the result on disk, see `pbrdf.kernels.caching`. Those with
-`forceinline` are parts of other kernels and get no entry from Python, which would make up
-a quarter of the time it takes to compile them all; `from_python` makes one.
+`forceinline` or `part` are parts of other kernels and get no entry from Python, see
+`pbrdf.kernels.parts`; `from_python` makes one. A constant argument is taken for any number
+of its type, so that no kernel is compiled once for every constant.
 """
 
 from collections.abc import Callable
@@ -12,33 +13,51 @@ from typing import Any
 
 import numba
 from numba.core.dispatcher import Dispatcher
+from numba.core.types import unliteral
 
 from pbrdf.kernels.caching import cache_folder, keeping, kernel_sources
+from pbrdf.kernels.parts import PartCompiler
 
 __all__ = ["cache_folder", "compiled_callback", "from_python", "jit", "kernel_sources"]
 
 
 def jit(
-    function: Callable[..., Any] | None = None, *, allocates: bool = True, **options: Any
+    function: Callable[..., Any] | None = None,
+    *,
+    allocates: bool = True,
+    part: bool = False,
+    **options: Any,
 ) -> Any:
     """Compile a kernel without the interpreter lock and cache it under `cache_folder`.
 
     With allocates=False the kernel makes no arrays and counts no references to those it
     is given: taking an array out of a named tuple inside a hot loop costs two atomic
-    operations otherwise, which made half the time of a path.
+    operations otherwise, which made half the time of a path. With part=True (or
+    forceinline) only other kernels can call it.
     """
     if function is None:
-        return lambda kernel: jit(kernel, allocates=allocates, **options)
+        return lambda kernel: jit(kernel, allocates=allocates, part=part, **options)
     settings: Any = {"nogil": True, "error_model": "numpy"} | options
+    # C functions are made by `compiled_callback`
+    settings["no_cfunc_wrapper"] = True
     if not allocates:
         settings["_nrt"] = False
-    inner = settings.get("forceinline", False)
-    if inner:
-        settings |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    part = part or settings.get("forceinline", False)
+    if part:
+        settings |= {"no_cpython_wrapper": True, "pipeline_class": PartCompiler}
     kernel = keeping(lambda keep: numba.njit(cache=keep, **settings)(function))
-    if inner and isinstance(kernel, Dispatcher):
-        _close_to_python(kernel)
+    # A plain function where NUMBA_DISABLE_JIT is set
+    if isinstance(kernel, Dispatcher):
+        _forget_constants(kernel)
+        if part:
+            _close_to_python(kernel)
     return kernel
+
+
+def _forget_constants(kernel: Any) -> None:
+    """Take a constant for any number of its type: Numba would compile for each of them."""
+    compile_ = kernel.compile
+    kernel.compile = lambda signature: compile_(tuple(map(unliteral, signature)))
 
 
 def _close_to_python(kernel: Any) -> None:

@@ -28,14 +28,6 @@ def chebyshev_points() -> tuple[np.ndarray, np.ndarray]:
 
 
 POINTS, POWERS = chebyshev_points()
-NOTHING = kernel.Spectra(
-    np.empty((0, 0, kernel.N_BIN)), np.empty((0, 0)), np.empty((0, 1, N_RECORD)),
-    np.zeros(2, dtype=np.int64),
-    FresnelTable(
-        np.empty((0, 0, 0, 0)), np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0))
-    ),
-    POINTS, POWERS, np.empty((4, MAX_ORDER)),
-)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,8 +75,7 @@ class Spectrum:
             layout[..., kernel.BIN_MID] = ranges[..., 0]
             layout[..., kernel.BIN_SCALE] = 1.0 / ranges[..., 1]
             bins.append(layout)
-            # Never of no size, which would mean that nothing is gathered
-            sizes.append(max(int(ends[-1, -1]), 1))
+            sizes.append(int(ends[-1, -1]))
         return cls(table=table, bins=tuple(bins), sizes=tuple(sizes))
 
     def part(self, first: int, last: int) -> "Spectrum":

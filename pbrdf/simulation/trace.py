@@ -22,7 +22,6 @@ from pbrdf.kernels.terrain.entry import Source
 from pbrdf.kernels.terrain.horizon import NO_HORIZON
 from pbrdf.kernels.terrain.sweep import N_FIRST
 from pbrdf.simulation.plan import Plan, Tally
-from pbrdf.simulation.spectra import NOTHING
 from pbrdf.surface.heightmap import HeightMap
 from pbrdf.surface.mesh import MeshSurface
 from pbrdf.tracer.embree import EmbreeField
@@ -80,7 +79,7 @@ def trace_sample(
             zenith, azimuth, tally.flux[index], tally.lit[index], tally.energy[index],
             tally.counts[index], np.zeros((4, 4)),
         )  # fmt: skip
-        light = tally.spectra[index] if tally.spectra else NOTHING
+        light = tally.spectra[index] if tally.spectra else None
         if isinstance(target, WetMesh):
             trace_on_mesh(
                 target.world(), source, target.field.top, plan.max_bounces, plan.n_stokes,

@@ -190,7 +190,7 @@ def constants(
             )
             raise ValueError(msg)
         base[:, column] = [
-            base_strength(*constants)
+            base_strength(*constants) if constants[0] else 0.0
             for constants in zip(albedo, n[:, column], kappa[:, column], strict=True)
         ]
     return n, kappa, base if base.any() else np.empty((count, 0))

@@ -16,6 +16,7 @@ from pbrdf.analytic import (
     reflectance,
     torrance_sparrow,
 )
+from pbrdf.kernels import from_python
 from pbrdf.kernels.optics.volume import internal_reflectance
 
 MIRROR = Material.mirror()
@@ -104,7 +105,9 @@ def walsh(n):
 
 @pytest.mark.parametrize("n", [1.333, 1.5, 2.4])
 def test_internal_reflectance_is_walsh_and_duntley(n):
-    assert_allclose(internal_reflectance(n, 0.0), 1 - (1 - walsh(n)) / n**2, rtol=1e-9)
+    assert_allclose(
+        from_python(internal_reflectance)(n, 0.0), 1 - (1 - walsh(n)) / n**2, rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize("form", ["base", "polarised-base"])

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
 from pbrdf import Film, GaussianSurface, HeightMap, Material, Scene, simulate
+from pbrdf.kernels import from_python
 from pbrdf.kernels.optics.volume import internal_reflectance
 from tests.contaminants.scenes import (
     assert_closed,
@@ -213,7 +214,7 @@ def test_diffuse_light_inside_is_thrown_back_as_the_integral_says(n):
 
     kink = [n**-2] if n > 1 else None
     expected = quad(share, 0, 1, points=kink, limit=500)[0]
-    assert_allclose(internal_reflectance(n, 0.0), expected, atol=3e-8)
+    assert_allclose(from_python(internal_reflectance)(n, 0.0), expected, atol=3e-8)
 
 
 ROUGH = GaussianSurface(shape=(64, 64), spacing=1.0, corr_length=8.0, slope_rms=0.2)

@@ -44,7 +44,7 @@ def make_tree(root: Path, value: float) -> None:
     (kernels / "drawer").mkdir(parents=True, exist_ok=True)
     (root / "pbrdf/__init__.py").touch()
     (kernels / "drawer/__init__.py").touch()
-    for name in ("__init__.py", "caching.py"):
+    for name in ("__init__.py", "caching.py", "parts.py"):
         shutil.copyfile(ROOT / "pbrdf/kernels" / name, kernels / name)
     (kernels / "caller.py").write_text(CALLER)
     (kernels / "drawer/callee.py").write_text(CALLEE.format(value=value))

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pbrdf import GaussianSurface
-from pbrdf.kernels import jit
+from pbrdf.kernels import from_python, jit
 from pbrdf.kernels.sights.looks import facet_place, set_ray
 from pbrdf.kernels.sights.walk import N_OF_RAY, Mesh, Rays, lift_clear
 from pbrdf.simulation.plan import Plan
@@ -196,7 +196,9 @@ def test_the_least_lift_is_where_each_ray_begins_to_clear(scene):
         rays.rise[:] = rises
         rays.lift[:] = -3.0 * unit
         most = 5.0 * unit
-        lift_clear(mesh, place, ensemble.reach, rays, most, along[0], along[1] / 0.8)
+        from_python(lift_clear)(
+            mesh, place, ensemble.reach, rays, most, along[0], along[1] / 0.8
+        )
         lifts.extend(rays.lift / unit)
         for slope, rise, lift in zip(slopes, rises, rays.lift, strict=True):
             for change, clears in ((-1e-6, False), (1e-6, True)):

@@ -125,7 +125,7 @@ def test_table_holds_its_tolerance_wherever_it_is_read(n, kappa):
     table = fresnel_table.build_table(np.array([[n]]), np.array([[kappa]]))
     for cos_beta in np.random.default_rng(1).random(3000) ** 2:
         found = table_elements(table, 0, 0, cos_beta)
-        exact = reflection_elements(cos_beta, n, kappa)
+        exact = from_python(reflection_elements)(cos_beta, n, kappa)
         # A quarter more than in the middle of a step, where the table was judged
         assert np.abs(np.subtract(found, exact)).max() <= 1.25e-8 * exact[0]
 
@@ -149,7 +149,7 @@ def test_two_bounces_in_closed_form_equal_the_product_of_matrices(n_stokes):
         record[:2, 0, shading.LABEL] = rng.permutation(2)
         closed, product = np.zeros((4, 4)), np.zeros((4, 4))
         path_mueller(record, 0, 2, 0, optics, n_stokes, closed)
-        shading.reflect_often(record, 0, 2, 0, optics, n_stokes, product)
+        from_python(shading.reflect_often)(record, 0, 2, 0, optics, n_stokes, product)
         assert_allclose(
             closed[:n_stokes, :n_stokes], product[:n_stokes, :n_stokes], atol=1e-15
         )

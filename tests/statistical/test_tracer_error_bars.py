@@ -7,6 +7,7 @@ from scipy.stats import chi2
 
 from pbrdf import GaussianSurface, Material, Scene, simulate
 from pbrdf.conventions import detector_bins
+from pbrdf.kernels import from_python
 from pbrdf.kernels.bins.neighbours import share_noise
 from pbrdf.simulation.moments import neighbour_room
 
@@ -140,7 +141,7 @@ def test_a_glint_lends_no_noise_to_the_dark_around_it():
     variance = np.full_like(mean, one**2)
     mean[9, 18], variance[9, 18] = peak, noise**2
     _, _, weight = detector_bins(18, 36)
-    share_noise(mean, variance, weight, one, neighbour_room((18, 36), 1))
+    from_python(share_noise)(mean, variance, weight, one, neighbour_room((18, 36), 1))
     error = np.sqrt(variance)
     assert_allclose(error[9, 18], noise, rtol=0.01)
     error[9, 18] = one

@@ -16,7 +16,7 @@ from pbrdf.kernels.optics.fresnel_table import TOLERANCE
 MIN_ORDER, MAX_ORDER = 3, 8
 
 
-@jit
+@jit(part=True)
 def angle_range(theta_i, low, high, dphi_low, dphi_high):
     """Smallest and largest cos(2 beta) from theta_i to a bin with dphi within [0, pi]."""
     least = 1.0
@@ -55,7 +55,7 @@ def cosine_ranges(theta_i, spread, ranges):
             ranges[i, j, 1] = max(0.5 * (math.cos(narrow) - math.cos(wide)), 1e-9)
 
 
-@jit
+@jit(part=True)
 def fit_elements(mid, half, order, n, kappa, points, powers, factors):
     """Factors of the powers of (x - mid) / half in A, B, C, D of one bin."""
     for k in range(order):
@@ -72,7 +72,7 @@ def fit_elements(mid, half, order, n, kappa, points, powers, factors):
             factors[3, k] += share * d
 
 
-@jit
+@jit(part=True)
 def fit_error(mid, half, order, n, kappa, factors):
     """Largest error of a fit as a fraction of A, where the error of a fit is largest.
 

@@ -14,7 +14,6 @@ HALF_PI = 0.5 * math.pi
 PI = math.pi
 
 
-@jit
 def bin_edges(n_theta, n_dphi):
     """Cosines of the zenith edges, and unit vectors along the lower azimuth edges."""
     zenith = np.empty(n_theta + 1)

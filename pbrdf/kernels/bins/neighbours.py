@@ -51,7 +51,7 @@ def sum_around(values, rows, n_columns):
                     values[i, x] += rows[other, x]
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def share_noise(mean, variance, weight, one, room):
     """Take the variances of the flux of a bin and of like neighbours together.
 

@@ -92,7 +92,7 @@ def heights_in_cylinder(radius, d_x, d_y, d_z, k_x, k_y, k_z):
     return middle - climb, middle + climb
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def stack_interval(slabs, first, last, radius, d_x, d_y, d_z, k_x, k_y, k_z):
     """`body_interval` of a body of several slabs, `first` to `last`."""
     wide = radius * (1.0 + CLOSE)

@@ -62,7 +62,7 @@ def part_inside(r_a, s_a, r_b, s_b):
     return moment, 0.5 * (r_b - r_a) * (r_b + r_a)
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def azimuth_share(
     heights, periodic, pitch_x, pitch_y, slabs, x, y, z, k_x, k_y, reach
 ):  # fmt: skip
@@ -158,7 +158,7 @@ def mean_near(heights, periodic, pitch_x, pitch_y, x, y, radius):
     return total / CIRCLE
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def lowest_near(heights, periodic, pitch_x, pitch_y, x, y, reach):
     """Lowest node of all facets nearer to (x, y) than `reach`."""
     nx, ny = heights.shape

@@ -53,7 +53,7 @@ def count_solids(mesh, state, top, step):
             within[within.shape[0] - 1] += step
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def next_on_mesh(mesh, state, top, kind, hit):
     """Find whether the beam meets a facet before the event of this kind in `hit`."""
     x, y, z = state[top, X], state[top, Y], state[top, Z]

@@ -61,7 +61,7 @@ def widest_above(slabs, s):
     return math.sqrt(largest)
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def profile_crossing(slabs, r_a, s_a, r_b, s_b):
     """Place on a segment, between one end inside and one outside, where it leaves."""
     inside_a = radius_squared(slabs, s_a) - r_a * r_a > 0.0
@@ -94,7 +94,7 @@ def profile_crossing(slabs, r_a, s_a, r_b, s_b):
     return share
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def deepest_inside(slabs, r_a, s_a, r_b, s_b):
     """Place on a segment with both ends outside where it is inside, or -1."""
     slope = (s_b - s_a) / (r_b - r_a)

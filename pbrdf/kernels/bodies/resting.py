@@ -13,7 +13,7 @@ from pbrdf.kernels.terrain.heightfield import (
 )
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def edge_rest(z_a, z_b, off_x, off_y, step_x, step_y, radius):
     """Height of the centre of a sphere that lies on an edge, or -FAR if it touches none.
 

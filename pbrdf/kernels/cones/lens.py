@@ -68,7 +68,7 @@ def cap_direction(a, s, cos_half, draw_a, draw_b):
     )
 
 
-@jit
+@jit(part=True)
 def lens_box(between, half_1, half_2):
     """Lens on the plane of the stereographic projection from the axis of the first cap.
 

@@ -16,7 +16,7 @@ from pbrdf.kernels.paths.shading import reflect_once
 Cones = namedtuple("Cones", "d d_s i i_s half_d cos_d sin_d half_i cos_i sin_i")
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def facet_mueller(cones, k, normal, index, w, m, n_stokes, mueller):
     """Matrix of light sent from the detector along -k to a facet and on to the source.
 

@@ -260,7 +260,7 @@ def sample_hemisphere(terrain, mesh, row, draw, old, scan):
     return fate, place, flight
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def follow_bundle(terrain, mesh, x, y, cos_phi, sin_phi, bundle, name, scan):
     """Follow one ray of a bundle, with all the rays it sends out, to their ends."""
     record, hits, counts = scan.record, scan.hits, scan.catch.counts

@@ -48,7 +48,7 @@ def end_path(scan, target, bounces, k, s):
     )
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def catch_path(weight, target, bounces, k, s, scan):
     """Add a path that leaves along k, in the frame of the polariser of a target."""
     end_path(scan, target, bounces, k, s)
@@ -63,7 +63,7 @@ def catch_path(weight, target, bounces, k, s, scan):
                 flux[ALL, target, order, w, row, column] += weight * mueller[row, column]
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def catch_glint(weight, share, target, bounces, k, s, scan):
     """Add a path that may have met the target by luck, and what others like it might add.
 
@@ -89,7 +89,7 @@ def catch_glint(weight, share, target, bounces, k, s, scan):
                 flux[GLINTS, target, order, w, row, column] += light
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def lose_path(weight, end, bounces, scan):
     """Count a path that is not followed to its end, and the unpolarised light on it."""
     record, catch = scan.record, scan.catch

@@ -38,7 +38,7 @@ def place_axes(targets, cos_phi, sin_phi, axes):
         axes[target, A_SY] = c
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def light_from_base(terrain, mesh, place, bounces, weight, draw, scan):
     """Ask each target for its light on the base under a facet: one ray into its cone.
 

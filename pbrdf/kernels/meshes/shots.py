@@ -79,7 +79,7 @@ def is_blocked(mesh, x, y, z, d_x, d_y, d_z):
     return mesh.ray[FARTHEST] < 0.0
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def is_delicate(mesh, n_x, n_y, n_z, x, y, z, k_x, k_y, k_z, before):
     """Whether another facet is so near a place that a ray has met that float32 may err.
 

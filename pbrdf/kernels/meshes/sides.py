@@ -51,7 +51,7 @@ def ask_either(mesh, within, face, x, y, z, k_x, k_y, k_z, t_end, delicate):
     return search(mesh, face, x, y, z, k_x, k_y, k_z, t_end, 0)
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def is_delicate_behind(mesh, n_x, n_y, n_z, x, y, z, k_x, k_y, k_z, before):
     """`is_delicate` where a ray arrives from either side, and may go on on both."""
     if k_x * n_x + k_y * n_y + k_z * n_z > 0.0:

@@ -139,7 +139,7 @@ def rotated_elements(way, a, b, c, d):
     )
 
 
-@jit
+@jit(part=True)
 def write_rotation(cos_2a, sin_2a, out):
     """Write the Mueller rotation R(a), equation (11)."""
     out[:, :] = 0.0

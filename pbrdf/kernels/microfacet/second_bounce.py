@@ -45,7 +45,7 @@ def between(cos_i, sin_i, cos_s, sin_s, cos_dphi, sin_dphi):
     )
 
 
-@jit
+@jit(part=True)
 def facet_matrix(way, cos_beta, n, kappa):
     """Rows of F' of one facet."""
     sin2_beta = max(0.0, (1.0 - cos_beta) * (1.0 + cos_beta))
@@ -53,14 +53,14 @@ def facet_matrix(way, cos_beta, n, kappa):
     return rotated_elements(way, a, b, c, d)
 
 
-@jit
+@jit(part=True)
 def overhang_of(rough, cos_theta, sin_theta, cos_phi, sin_phi):
     """Lambda of a direction above the horizon."""
     slope = slope_along(rough, cos_phi, sin_phi)
     return mean_overhang(rough, cos_theta, sin_theta, slope)
 
 
-@jit
+@jit(part=True)
 def add_product(weight, second, first, out):
     """Add weight * second @ first."""
     for i in range(4):
@@ -71,7 +71,7 @@ def add_product(weight, second, first, out):
             out[i, j] += weight * total
 
 
-@jit
+@jit(part=True)
 def add_facet_pair(slope_x, slope_y, source, detector, n, kappa, rough, scale, out):
     """Add the light that the facet of these slopes sends to the detector by one other.
 

@@ -35,7 +35,7 @@ __all__ = [
 Shadowing = namedtuple("Shadowing", "rule omega tau")
 
 
-@jit
+@jit(part=True)
 def maxwell_beard(facet, omega, tau):
     """Empirical equation (21): (1 + tilt/Omega exp(-2 beta/tau))/(1 + tilt/Omega)."""
     tilt = atan2(sqrt(facet.tan2_tilt + TINY), 1.0)
@@ -53,13 +53,13 @@ def torrance_sparrow(way, facet):
     return select(open_part < 1.0, open_part, 1.0)
 
 
-@jit
+@jit(part=True)
 def facing_up(cos_theta, sin_theta, slope):
     """Numerator 1 - erfc(nu)/2 of Smith 1967: the part of the facets turned to the ray."""
     return 0.5 * (1.0 + erf(steepness(cos_theta, sin_theta, slope)))
 
 
-@jit
+@jit(part=True)
 def direction_weight(way):
     """How far the two hidings are independent: 0 at one azimuth, 4.41 d/(4.41 d + 1) at d.
 

@@ -43,7 +43,7 @@ NODES = tuple((0.5 + 0.5 * _nodes).tolist())
 WEIGHTS = tuple((0.5 * _weights).tolist())
 
 
-@jit
+@jit(part=True)
 def scaled_erfc(x):
     """exp(x^2) erfc(x) for x > 0: directly if small, else by its continued fraction."""
     small = select(x < 1.5, x, 1.5)
@@ -119,7 +119,7 @@ def slope_along(rough, cos_phi, sin_phi):
     return sqrt(x * x + y * y)
 
 
-@jit
+@jit(part=True)
 def overhang_integral(rough, cot):
     """Overhang of any radial law: (2/a) integral f(a^2 + x^2) (x - a atan(x/a)) x dx."""
     # Stretch x = scale z/(1 - z) so that core and tail both fall within (0, 1)

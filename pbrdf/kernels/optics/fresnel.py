@@ -93,7 +93,7 @@ def facet_elements(cos_beta, sin2_beta, n, kappa):
     )
 
 
-@jit
+@jit(part=True)
 def reflection_elements(cos_beta, n, kappa):
     """Elements of the reflection matrix: [[A, B], [B, A]] over [[C, -D], [D, C]].
 
@@ -113,7 +113,7 @@ def reflection_elements(cos_beta, n, kappa):
     return facet_elements(cos_beta, sin2_beta, n, kappa)
 
 
-@jit
+@jit(part=True)
 def reflection_amplitudes(cos_beta, n, kappa):
     """Complex (r_s, r_p) of a facet hit at local incidence beta, from vacuum.
 
@@ -135,7 +135,7 @@ def reflection_amplitudes(cos_beta, n, kappa):
     return r_s, r_p
 
 
-@jit
+@jit(part=True)
 def transmitted_powers(cos_beta, n, kappa):
     """Return T_s = 4 c Re(q)/|c + q|^2 and T_p = T_s (|q|^2 + s^2)/|s^2 + q c|^2.
 
@@ -152,7 +152,7 @@ def transmitted_powers(cos_beta, n, kappa):
     return trans_s, trans_p
 
 
-@jit
+@jit(part=True)
 def transmission_parts(cos_beta, n, kappa):
     """Return (T_s + T_p)/2, (T_s - T_p)/2, sqrt(T_s T_p) without a branch."""
     perfect = n == inf
@@ -165,7 +165,7 @@ def transmission_parts(cos_beta, n, kappa):
     )
 
 
-@jit
+@jit(part=True)
 def transmission_elements(cos_beta, n, kappa):
     """Elements A, B, C, D of the power that crosses: T_s = 1 - R_s, T_p = 1 - R_p.
 
@@ -191,7 +191,7 @@ def transmission_elements(cos_beta, n, kappa):
     )
 
 
-@jit
+@jit(part=True)
 def write_facet_matrix(a, b, c, d, out):
     """Write [[A, B], [B, A]] and [[C, -D], [D, C]] into a zeroed 4x4 matrix."""
     out[0, 0] = out[1, 1] = a

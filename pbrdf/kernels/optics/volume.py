@@ -37,7 +37,7 @@ NODES = tuple((0.5 + 0.5 * _nodes).tolist())
 WEIGHTS = tuple((0.5 * _weights).tolist())
 
 
-@jit
+@jit(part=True)
 def internal_reflectance(n, kappa):
     """Share of diffuse light that the interface throws back inside: 1 - (1 - F_e)/n^2.
 
@@ -71,7 +71,7 @@ def base_radiance(n, kappa, diffuse):
     return albedo / (pi * n * n * (1.0 - albedo * internal_reflectance(n, kappa)))
 
 
-@jit
+@jit(part=True)
 def volume_elements(way, n, kappa, diffuse, radiance):
     """Rows of T(theta_s) diag(1, p, p, p) T(theta_i), p = 1 - depolarisation.
 

@@ -11,7 +11,6 @@ from pbrdf.kernels.bins.binning import exact_bin, rough_place
 from pbrdf.kernels.optics.frames import exit_turn
 from pbrdf.kernels.paths.ray_bounce import bounce_at, normal_of_slopes
 from pbrdf.kernels.paths.shading import (
-    ABSORBED,
     COS_IN,
     COS_OUT,
     LABEL,
@@ -20,9 +19,8 @@ from pbrdf.kernels.paths.shading import (
     SPECULAR,
     TURN_C,
     TURN_S,
-    tally_path,
 )
-from pbrdf.kernels.paths.spectra import gather_path
+from pbrdf.kernels.paths.spectra import begin_light, end_light
 from pbrdf.kernels.terrain.entry import way_of
 from pbrdf.kernels.terrain.heightfield import corner_heights, steps_of
 from pbrdf.kernels.terrain.sweep import F_FACET, F_I, F_J
@@ -91,9 +89,5 @@ def end_after_one(mirrored, at, label, cos_phi, sin_phi, record, spectra, optics
         mirrored[at + M_X], mirrored[at + M_Y], mirrored[at + M_Z],
         cos_phi, sin_phi, tally.zenith, tally.azimuth,
     )  # fmt: skip
-    if spectra.sums.size > 0:
-        gather_path(N_ESCAPED, record, 0, 1, i_theta, i_dphi, spectra, optics, tally)
-        return
-    for w in range(tally.energy.shape[0]):
-        tally.energy[w, ABSORBED] += 1.0
-    tally_path(N_ESCAPED, record, 0, 1, i_theta, i_dphi, optics, tally)
+    begin_light(spectra, tally)
+    end_light(spectra, N_ESCAPED, record, 0, 1, i_theta, i_dphi, optics, tally)

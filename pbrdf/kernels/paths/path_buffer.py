@@ -103,7 +103,7 @@ def shade_paths(w, spectra, optics, flux, slot, energy, mueller):
         row += bounces + 2
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def empty_buffer(spectra, optics, tally):
     """Shade the paths of the buffer into the tally of all wavelengths."""
     if not spectra.state[OVERFLOWED]:

@@ -26,7 +26,7 @@ def mix(x):
     return x ^ (x >> np.uint64(31))
 
 
-@jit
+@jit(part=True)
 def uniform_pair(stream, ray, event):
     """Two uniform numbers in [0, 1) of an event on the path of a ray."""
     name = mix(np.uint64(stream) + GOLDEN * np.uint64(ray))

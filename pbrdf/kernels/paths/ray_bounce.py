@@ -45,7 +45,7 @@ def bounce_at(k, s, normal):
     return r, kept_axis(s, w), cos_beta, turn
 
 
-@jit
+@jit(part=True)
 def scatter_at(normal, draw_a, draw_b):
     """Direction spread as the cosine about a unit normal, from two uniform numbers.
 

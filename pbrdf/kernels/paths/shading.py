@@ -172,7 +172,7 @@ def begin_columns(n_stokes, mueller):
             mueller[row, column] = 1.0 if row == column else 0.0
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def reflect_often(record, ray, bounces, w, optics, n_stokes, mueller):
     """Mueller matrix of a path of any length, all its columns side by side."""
     n, kappa, base = optics.n, optics.kappa, optics.base

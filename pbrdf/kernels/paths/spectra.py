@@ -31,6 +31,7 @@ from pbrdf.kernels.paths.shading import (
     SPECULAR,
     TURN_C,
     TURN_S,
+    tally_path,
 )
 
 N_SUMS = 9  # 1, c_in, s_in, c_out, s_out, and the four products of an in and an out
@@ -41,10 +42,10 @@ BIN_START, BIN_ORDER, BIN_MID, BIN_SCALE, N_BIN = 0, 1, 2, 3, 4
 # takes it; a matrix (4, 4), its elements (stokes ** 2,) and elements at points (4,
 # MAX_ORDER)
 Room = namedtuple("Room", "flux by_bin mueller matrix factors")
-# bins (n_theta, n_dphi, N_BIN); sums (materials, size), of no size where every path is
-# shaded at once; paths and state (2,), the buffer of `pbrdf.kernels.paths.path_buffer`; the
-# `FresnelTable`; points and powers: Chebyshev points (MAX_ORDER + 1, MAX_ORDER) and the
-# matrices from values there to the factors of the powers; room for elements at the points
+# bins (n_theta, n_dphi, N_BIN); sums (materials, size); paths and state (2,), the buffer
+# of `pbrdf.kernels.paths.path_buffer`; the `FresnelTable`; points and powers:
+# Chebyshev points (MAX_ORDER + 1, MAX_ORDER) and the matrices from values there to the
+# factors of the powers; room for elements at the points
 Spectra = namedtuple("Spectra", "bins sums paths state table points powers factors")
 
 
@@ -102,6 +103,23 @@ def gather_path(end, record, ray, bounces, i_theta, i_dphi, spectra, optics, tal
         add_bounce(record, ray, i_theta, i_dphi, optics.n_stokes, spectra)
     else:
         keep_path(end, record, ray, bounces, i_theta, i_dphi, spectra, optics, tally)
+
+
+@jit(forceinline=True)
+def begin_light(spectra, tally):
+    """Add the unit of light of a ray that enters, to be taken from as it leaves."""
+    if spectra is None:
+        for w in range(tally.energy.shape[0]):
+            tally.energy[w, ABSORBED] += 1.0
+
+
+@jit(forceinline=True)
+def end_light(spectra, end, record, ray, bounces, i_theta, i_dphi, optics, tally):
+    """Tally a path at once, or with `Spectra` gather it to be shaded afterwards."""
+    if spectra is None:
+        tally_path(end, record, ray, bounces, i_theta, i_dphi, optics, tally)
+    else:
+        gather_path(end, record, ray, bounces, i_theta, i_dphi, spectra, optics, tally)
 
 
 @jit(forceinline=True)

@@ -38,7 +38,6 @@ from pbrdf.kernels.paths.mesh_lines import FATE, foresee_second, meet_first
 from pbrdf.kernels.paths.random import Draw, pair_of, uniform_pair
 from pbrdf.kernels.paths.ray_bounce import mirror_at, scatter_at
 from pbrdf.kernels.paths.shading import (
-    ABSORBED,
     COS_IN,
     COS_OUT,
     LABEL,
@@ -55,9 +54,8 @@ from pbrdf.kernels.paths.shading import (
     TURN_C,
     TURN_S,
     WEIGHT,
-    tally_path,
 )
-from pbrdf.kernels.paths.spectra import gather_path
+from pbrdf.kernels.paths.spectra import begin_light, end_light
 from pbrdf.kernels.terrain.embree import SELF
 from pbrdf.kernels.terrain.entry import (
     entry_point,
@@ -157,10 +155,7 @@ def end_path(fate, bounces, k, s, weight, beam, sink):
         i_theta, i_dphi = bin_of_direction(
             k.x, k.y, k.z, beam.cos_phi, beam.sin_phi, tally.zenith, tally.azimuth
         )
-    if spectra.sums.size > 0:
-        gather_path(end, record, 0, bounces, i_theta, i_dphi, spectra, optics, tally)
-    else:
-        tally_path(end, record, 0, bounces, i_theta, i_dphi, optics, tally)
+    end_light(spectra, end, record, 0, bounces, i_theta, i_dphi, optics, tally)
 
 
 @jit(forceinline=True)
@@ -177,9 +172,7 @@ def trace_ray(terrain, tree, mesh, fate, place, beam, draw, sink, told=UNTOLD):
     max_bounces = record.shape[0] - 1
     splits = optics.base.shape[1] > 0
     polarised = optics.n_stokes > 1
-    if spectra.sums.size == 0:
-        for w in range(tally.energy.shape[0]):
-            tally.energy[w, ABSORBED] += 1.0
+    begin_light(spectra, tally)
     tally.counts[N_SEGMENTS] += 1
     bounces = 0
     n_waiting = 0
@@ -255,7 +248,7 @@ def trace_batch(terrain, tree, source, record, waiting, spectra, optics, tally):
 
     Every ray is followed from its entry point in the top plane; see `sweep_batch`. It
     walks, or with a `pbrdf.kernels.terrain.embree.Tree` asks Embree for each facet.
-    `record` and `waiting` are room to work in. With `Spectra` of some size the light is
+    `record` and `waiting` are room to work in. With `Spectra`, not None, the light is
     gathered there, to be shaded afterwards.
     """
     sink = Sink(record, waiting, spectra, optics, tally)

@@ -83,7 +83,7 @@ def seen_strength(law, theta_i, theta_s, dphi, cos_phi, sin_phi):
     return strength(law, way, mirror_facet(way)) * way.sin_s / (1.0 + hidden)
 
 
-@jit
+@jit(part=True)
 def slopes_at(theta_i, theta_s, dphi):
     """Slopes of the facet that mirrors into a direction, of a source at azimuth 0."""
     facet = mirror_facet(directions(theta_i, theta_s, dphi, 1.0, 0.0))
@@ -115,7 +115,7 @@ def write_elements(rows, n_stokes, weight, out):
             out[row * n_stokes + column] += weight * rows[row][column]
 
 
-@jit
+@jit(part=True)
 def add_panel(
     law, theta_i, cos_phi, sin_phi, panel, nodes, weights, n, kappa, n_stokes, light, cell
 ):

@@ -350,7 +350,7 @@ def cross_line(mesh, place, rays, first, at, pace, t, look):
     return Among(i, j, x0, y0, t_x, t_y, t_d)
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def lift_clear(mesh, place, reach, rays, most, speed_x, speed_y):
     """Raise the lifts of rays until they meet no other facet, or to `most` and more.
 

@@ -150,7 +150,7 @@ def arrive_on_facet(terrain, i, j, u, v, z, k_x, k_y, k_z, column, row, facet):
     return ci, cj, u, v, z00 + step_x * u + step_y * v
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def leave_mesh(terrain, frame, x, y, k_x, k_y):
     """Time at which a ray from (x, y) [cells] leaves the rectangle of the mesh."""
     nx, ny = cell_counts(terrain)

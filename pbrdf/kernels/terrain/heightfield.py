@@ -38,7 +38,6 @@ Terrain = namedtuple(
 )
 
 
-@jit
 def block_maxima(heights, periodic):
     """Maximum height over blocks of 2, 4, 8 ... cells.
 
@@ -55,21 +54,28 @@ def block_maxima(heights, periodic):
     size = 0
     for level in range(depth):
         levels[level] = size, (ny + (2 << level) - 1) >> (level + 1)
-        size += ((nx + (2 << level) - 1) >> (level + 1)) * levels[level, 1]
+        size += ((nx + (2 << level) - 1) >> (level + 1)) * int(levels[level, 1])
     maxima = np.full(size, -np.inf)
+    fill_maxima(heights, periodic, levels, maxima)
+    return maxima, levels
+
+
+@jit(allocates=False)
+def fill_maxima(heights, periodic, levels, maxima):
+    """Find the maxima of `block_maxima`."""
+    nx, ny = grid_cells(heights, periodic)
     row = levels[0, 1]
     for i in range(nx):
         for j in range(ny):
             z00, z10, z01, z11 = corner_heights(heights, i, j, periodic)
             block = (i >> 1) * row + (j >> 1)
             maxima[block] = max(maxima[block], max(max(z00, z10), max(z01, z11)))
-    for level in range(1, depth):
-        below, row_below = levels[level - 1]
-        offset, row = levels[level]
+    for level in range(1, levels.shape[0]):
+        below, row_below = levels[level - 1, 0], levels[level - 1, 1]
+        offset, row = levels[level, 0], levels[level, 1]
         for k in range(offset - below):
             block = offset + (k // row_below >> 1) * row + (k % row_below >> 1)
             maxima[block] = max(maxima[block], maxima[below + k])
-    return maxima, levels
 
 
 @jit(forceinline=True)

@@ -50,7 +50,7 @@ def is_free(horizon, z_top, i, j, z, speed_x, speed_y, speed_z):
     )
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def block_extremes(heights, periodic, rise, top):
     """Steepest rise by octant (8, blocks, blocks) and highest node (blocks, blocks)."""
     nx, ny = heights.shape
@@ -91,6 +91,14 @@ def block_extremes(heights, periodic, rise, top):
 
 
 @jit(forceinline=True)
+def copy(values, out):
+    """Copy a value a block."""
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            out[i, j] = values[i, j]
+
+
+@jit(forceinline=True)
 def beyond(values, i, j, periodic, outside):
     """Value of block (i, j), round the period or else beyond the rim."""
     bx, by = values.shape
@@ -113,18 +121,20 @@ def spread(values, out, di, dj, ei, ej, periodic, outside):
             )
 
 
-@jit
-def look_ahead(values, first, last, o, spare, periodic, outside):
+@jit(part=True, allocates=False)
+def look_ahead(values, first, last, o, spare, periodic, outside, room, out):
     """Largest value over the blocks `first` to `last` that a ray of octant o may meet.
 
     Counted along the faster axis; `spare` more where a block at the end of the map is
-    narrower than others. Beyond the rim of a finite map the value is `outside`.
+    narrower than others. Beyond the rim of a finite map the value is `outside`. `room` has
+    two layers the size of the result.
     """
     sign_x = -1 if o & 2 else 1
     sign_y = -1 if o & 1 else 1
     along_i, along_j = (sign_x, 0) if o >= 4 else (0, sign_y)
     side_i, side_j = (0, sign_y) if o >= 4 else (sign_x, 0)
-    now, then = values.copy(), np.empty_like(values)
+    now, then = room[0], room[1]
+    copy(values, now)
     for _ in range(1 + spare):
         spread(now, then, side_i, side_j, side_i, side_j, periodic, outside)
         now, then = then, now
@@ -140,10 +150,9 @@ def look_ahead(values, first, last, o, spare, periodic, outside):
                     beyond(now, i + sign_x, j + sign_y, periodic, outside),
                 )
         now, then = then, now
-    return now
+    copy(now, out)
 
 
-@jit
 def build_horizon(heights, periodic, z_top):
     """Look ahead from every block in every octant: (8, blocks, blocks, N_AHEAD)."""
     nx, ny = heights.shape
@@ -152,19 +161,33 @@ def build_horizon(heights, periodic, z_top):
     shape = ((nx + BLOCK - 1) >> SHIFT, (ny + BLOCK - 1) >> SHIFT)
     if min(shape) < LEAST_BLOCKS:
         return np.empty((0, 0, 0, N_AHEAD))
-    rise = np.empty((8, shape[0], shape[1]))
-    top = np.empty(shape)
-    block_extremes(heights, periodic, rise, top)
     spare = 1 if nx % BLOCK or ny % BLOCK else 0
-    horizon = np.empty((8, shape[0], shape[1], N_AHEAD))
-    for o in range(8):
-        # Beyond the rim of a finite map no rise is enough, and the top must be cleared
-        near = look_ahead(rise[o], 0, NEAR, o, spare, periodic, np.inf)
-        middle = look_ahead(top, NEAR + 1, MIDDLE, o, spare, periodic, z_top)
-        far = look_ahead(top, MIDDLE + 1, FAR, o, spare, periodic, z_top)
-        for i in range(shape[0]):
-            for j in range(shape[1]):
-                horizon[o, i, j, STEEPEST] = near[i, j] + MARGIN * abs(near[i, j])
-                horizon[o, i, j, HIGHEST_MIDDLE] = middle[i, j]
-                horizon[o, i, j, HIGHEST_FAR] = far[i, j]
+    # The largest rise of each octant, the top, and two layers to work in
+    room = np.empty((11, *shape))
+    horizon = np.empty((8, *shape, N_AHEAD))
+    fill_horizon(heights, periodic, z_top, spare, room, horizon)
     return horizon
+
+
+@jit(allocates=False)
+def fill_horizon(heights, periodic, z_top, spare, room, horizon):
+    """Look ahead as `build_horizon` says."""
+    top = room[8]
+    block_extremes(heights, periodic, room, top)
+    for o in range(8):
+        ahead = horizon[o]
+        # Beyond the rim of a finite map no rise is enough, and the top must be cleared
+        for what in range(N_AHEAD):
+            if what == STEEPEST:
+                values, outside, first, last = room[o], np.inf, 0, NEAR
+            elif what == HIGHEST_MIDDLE:
+                values, outside, first, last = top, z_top, NEAR + 1, MIDDLE
+            else:
+                values, outside, first, last = top, z_top, MIDDLE + 1, FAR
+            look_ahead(
+                values, first, last, o, spare, periodic, outside, room[9:],
+                ahead[:, :, what],
+            )  # fmt: skip
+        for i in range(top.shape[0]):
+            for j in range(top.shape[1]):
+                ahead[i, j, STEEPEST] += MARGIN * abs(ahead[i, j, STEEPEST])

@@ -20,7 +20,7 @@ from pbrdf.kernels.terrain.heightfield import (
 F_I, F_J, F_FACET, F_U, F_V, F_Z, N_FIRST = 0, 1, 2, 3, 4, 5, 6
 
 
-@jit(allocates=False)
+@jit(part=True, allocates=False)
 def sweep_line(terrain, line, source, z_start, meetings):
     """Find the first facet of every ray of a line that starts at the height z_start.
 

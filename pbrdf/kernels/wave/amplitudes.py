@@ -206,7 +206,7 @@ def turned(jones, ray_in, ray_out, come, to):
     return ss, sp, ps, pp
 
 
-@jit
+@jit(part=True)
 def curvature_changes(ray_in, ray_out, shift_x, shift_y, medium):
     """First-order less tangent-plane kernel where the surface adds a wave vector +-shift.
 

@@ -23,7 +23,7 @@ REACH, TERMS_IN_WIDTH = 8.5, 1.3
 LEAST_EXPONENT = -745.0
 
 
-@jit
+@jit(part=True)
 def heaviest_order(g, kappa):
     """Order where g^n/n! exp(-kappa/n) is largest, from n^2 ln(n/g) = kappa."""
     target = 2.0 * kappa / (g * g)
@@ -36,7 +36,7 @@ def heaviest_order(g, kappa):
     return g * sqrt(y)
 
 
-@jit
+@jit(part=True)
 def poisson_weight(n, g):
     """e^{-g} g^n/n! to full accuracy for n above 10 or so.
 
@@ -84,7 +84,7 @@ def window(law, g, kappa):
     return first, last, max(np.floor(width / TERMS_IN_WIDTH), 1.0)
 
 
-@jit
+@jit(part=True)
 def order_moments(law, dimensions, g, kappa):
     """Sum weight, spectrum and n^2, n, 1, 1/n or 1/n^2 over n, the length being 1."""
     first, last, step = window(law, g, kappa)

@@ -15,7 +15,7 @@ from pbrdf.kernels.wave.scatter import HORIZON, shadowing
 __all__ = ["fill_changes", "fill_profile"]
 
 
-@jit
+@jit(part=True)
 def plane_ray(lateral):
     """Ray of a signed lateral wave vector."""
     length = min(abs(lateral), 1.0)
@@ -23,7 +23,7 @@ def plane_ray(lateral):
     return Ray(length, cosine, 1.0 if lateral >= 0.0 else -1.0, 0.0)
 
 
-@jit
+@jit(part=True)
 def kernels_between(lateral_in, lateral_out, medium):
     """First-order and tangent-plane kernels b of s and p, in frames that do not turn."""
     ray_in, ray_out = plane_ray(lateral_in), plane_ray(lateral_out)

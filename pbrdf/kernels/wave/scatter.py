@@ -113,7 +113,7 @@ def no_jones():
     return zero, zero, zero, zero
 
 
-@jit
+@jit(part=True)
 def over_orders(sums, plain, per_order, mean, moments):
     """Add the mean square of plain + per_order/n + n mean over the orders.
 
@@ -165,7 +165,7 @@ def node(plan, k, spread, ray_in, ray_out):
     return share * x, share * y
 
 
-@jit
+@jit(part=True)
 def with_curvature(ray_in, ray_out, medium, plan, surface, moments, changes):
     """Sum the order-weighted amplitude with the mean and scatter of the curvature.
 
@@ -197,7 +197,7 @@ def with_curvature(ray_in, ray_out, medium, plan, surface, moments, changes):
     return over_orders(sums, plain, change, mean, moments)
 
 
-@jit
+@jit(part=True)
 def scattered_sums(ray_in, ray_out, medium, plan, surface, moments, changes):
     """Products of Jones elements of the scattered light, by the plan's amplitude."""
     if plan.kernel == CURVATURE:
