@@ -25,6 +25,8 @@ NO_MORE = 1e-18
 # Smallest share of a peak that is kept: what lies below is rounding of the transform
 FLOOR = 1e-13
 RISES, WAVES = 64, 220
+# Panels of lags in a table, which bounds memory to some 0.2 GB
+MOST_PANELS = 8000
 # Points of a spectrum that carry it on below the noise
 PARABOLA = 4
 # Least and largest q h over the rises of a table
@@ -114,6 +116,15 @@ class OrderTable:
         length = self.statistics.corr_length
         far = self.statistics.farthest_lag
         steps = max(int(np.ceil(far * self.largest_wave / (3 * np.pi))), 24)
+        if steps > MOST_PANELS:
+            msg = (
+                "the autocorrelation must fall within "
+                f"{far * MOST_PANELS / steps:.4g} um at waves of "
+                f"{4 * np.pi / self.largest_wave:.3g} um, got {far:.4g} um: sums over "
+                "orders would take minutes and gigabytes. Take method='first-order', or a "
+                "statement of the heights over the lengths that matter."
+            )
+            raise ValueError(msg)
         edges = np.unique(
             np.r_[0.0, np.geomspace(1e-4 * length, far, 40), np.linspace(0, far, steps)]
         )

@@ -215,6 +215,8 @@ def draw_sweep() -> None:
     print("share, peak [1/sr], DOLP; the largest step to a neighbour, in ln peak, is")
     for k in range(0, 61, 6):
         print(f"{waves[k]:7.3f} {share[k]:.3e} {peak[k]:.4e} {dolp[k]:.4f}")
+    print(f"largest step of DOLP {np.abs(np.diff(dolp)).max():.1e}, of its step "
+          f"{np.abs(np.diff(dolp, 2)).max():.1e}")  # fmt: skip
     steps = np.diff(np.log(peak))
     bends = np.abs(np.diff(steps)).max()
     print(f"{np.abs(steps).max():.3f}; second differences up to {bends:.3f}")

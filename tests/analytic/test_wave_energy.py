@@ -144,6 +144,12 @@ def test_faults_of_the_heights_are_named() -> None:
         WaveModel(
             glass, height_rms=0.1, corr_length=1.0, autocorrelation=lambda x: 1 / (1 + x)
         )
+    endless = WaveModel(
+        glass, height_rms=0.8, corr_length=12.0, autocorrelation="k-correlation",
+        exponent=1.1, method="kirchhoff",
+    )  # fmt: skip
+    with pytest.raises(ValueError, match=r"autocorrelation must fall within 30\d\d um at"):
+        endless.brdf(0.1, 0.2, 0.3, 0.5)
     ripples = WaveModel(
         glass, height_rms=0.1, method="geometric",
         autocorrelation=lambda x: np.exp(-(x**2)) * np.cos(2 * x),
