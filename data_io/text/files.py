@@ -46,7 +46,8 @@ def read_texts(path: str | Path) -> list[str]:
     if text is None or _CONTROL.search(text):
         problem = "expected a text file, found binary data"
         raise DataFileError(path, problem, "Give the text export of the instrument.")
-    text = _MICRO.sub("\u00b5", text)
+    # Programs that join files leave a mark of each
+    text = _MICRO.sub("\u00b5", text.replace("\ufeff", ""))
     for plain, signs in _TYPESET.items():
         for sign in signs:
             text = text.replace(sign, plain)

@@ -1,5 +1,6 @@
 """Columns of text beside the numbers: remarks, or what tells rows apart."""
 
+import re
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,6 +19,10 @@ _POLARISATIONS = {
     "p": "p", "tm": "p", "parallel": "p", "p-pol": "p",
     "ss": "ss", "sp": "sp", "ps": "ps", "pp": "pp",
 }  # fmt: skip
+# What says of each reading whether it counts
+_MARKS = re.compile(
+    r"flag|qualit|valid|saturat|status|mask|reject|outlier|discard|overload", re.IGNORECASE
+)
 _UNPOLARISED = {"u", "unpol", "unpol.", "unpolarised", "unpolarized", "none"}
 # Remarks are many or alike; a few words that come again tell rows apart
 _SHOWN = 4
@@ -29,7 +34,8 @@ def say_left_out(path: Path, table: RawTable, names: Sequence[str]) -> None:
     Raises
     ------
     DataFileError
-        If one holds the polarisation of each row, which no element is free of.
+        If one holds the polarisation of each row, which no element is free of, or marks
+        readings as good or bad.
 
     Warns
     -----
@@ -39,13 +45,28 @@ def say_left_out(path: Path, table: RawTable, names: Sequence[str]) -> None:
     said = []
     for name in names:
         text = table.cells.iloc[:, table.names.index(name)]
-        words = list(dict.fromkeys(cell for cell in text if not is_gap(cell)))
-        _refuse_polarisation(path, table, name, words)
+        words = list(dict.fromkeys(cell for cell in text if cell))
+        _refuse_polarisation(path, table, name, [w for w in words if not is_gap(w)])
+        _refuse_marks(path, table, name, text.tolist())
         listed = ", ".join(repr(shortened(word, 20)) for word in words[:_SHOWN])
         more = f" and {len(words) - _SHOWN} more" if len(words) > _SHOWN else ""
         said.append(f"{name} ({listed}{more})")
     msg = f"{path.name}: columns of text are left out: {shortened(', '.join(said), 240)}."
     warnings.warn(msg, ConventionWarning, stacklevel=6)
+
+
+def _refuse_marks(path: Path, table: RawTable, name: str, text: Sequence[str]) -> None:
+    """Refuse a column that tells good readings from bad ones: nobody obeys it here."""
+    words = list(dict.fromkeys(text))
+    if len(words) < 2 or not _MARKS.search(name):
+        return
+    row = next(k for k, word in enumerate(text) if word != text[0])
+    problem = f"expected readings that all count, got {words[0]!r} and {words[1]!r}"
+    cure = (
+        "Empty the cells of readings that do not count; or, if all do, --columns "
+        f"{bare_name(name)}=ignore."
+    )
+    raise DataFileError(path, problem, cure, line=table.lines[row], column=name)
 
 
 def _refuse_polarisation(
