@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import fitting
 from fitting.prediction.waves import density_of
 from pbrdf import GaussianSurface, HeightMap, Material, MicrofacetModel, WaveModel
+from pbrdf.cli.app import app
 
 WAVE, HEIGHT, LENGTH = 0.65, 0.04, 1.5
 SURFACE = GaussianSurface(
@@ -76,3 +78,15 @@ def test_what_a_coarse_map_leaves_out_is_said():
     coarse = HeightMap(drawn(periodic=True).heights[::3, ::3], 0.6, periodic=True)
     with pytest.warns(UserWarning, match="leave out the roughness that scatters beyond"):
         fitting.predict(coarse, Material(1.5), wavelength=WAVE)
+
+
+def test_the_command_tells_the_beam(tmp_path):
+    np.save(tmp_path / "map.npy", drawn(periodic=True).heights[:128, :128])
+    words = ["predict", str(tmp_path / "map.npy"), "--spacing-um", "0.2", "--n", "1.5"]
+    words += ["--wavelength-um", "0.65", "--theta-i-deg", "30"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    assert "Waves are used, not facets" in done.output
+    assert "incidence 30 deg: reflectance of the specular beam 0.0" in done.output
+    facets = CliRunner().invoke(app, [*words, "--facets"])
+    assert "specular beam" not in facets.output

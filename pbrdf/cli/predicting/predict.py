@@ -60,6 +60,13 @@ def command(
     diffuse_albedo: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="Of the base under the interface.")
     ] = 0.0,
+    wave: Annotated[
+        bool | None,
+        typer.Option(
+            "--waves/--facets",
+            help="Whether waves scatter or facets mirror; by the roughness if not given.",
+        ),
+    ] = None,
     spacing: options.Spacing = None,
     unit: options.Unit = None,
     channel: options.Channel = None,
@@ -98,7 +105,7 @@ def command(
     measured = None if scan is None else read_scan(scan, declared=declared)
     if measured is not None and wavelength is not None and "wavelength" in measured.coords:
         measured = read_scan(scan, wavelength=wavelength, declared=declared)  # type: ignore[arg-type]
-    wave = _wavelength(wavelength, measured)
+    light = _wavelength(wavelength, measured)
     heights = read_surface(
         surface, kind=options.Kind.map, spacing=spacing, unit=unit, channel=channel,
         columns=columns, block=block, um_per_level=um_per_level, mend=mend,
@@ -107,7 +114,7 @@ def command(
         msg = f"{surface.name} must be a height map, a profile has slopes along one axis."
         raise ValueError(msg)
     found = predict(
-        heights, material, wavelength=wave, resolution=resolution, seed=seed,
+        heights, material, wavelength=light, resolution=resolution, seed=seed, wave=wave,
         instrument=_instrument(aperture, instrument_wavelength, pixel),
     )  # fmt: skip
     geometry = _plane(option_text.incidences(theta_i)) if measured is None else measured
