@@ -25,10 +25,12 @@ def digest(variable: xr.Variable) -> str:
     values = np.ascontiguousarray(variable.to_numpy())
     text = values.dtype.kind in "OTU"
     held = values.reshape(-1)
-    content = "\0".join(map(str, held)).encode() if text else held.tobytes()
+    content = "\0".join(map(str, held)).encode() if text else held.view(np.uint8)
     kind = "text" if text else values.dtype.str
     head = f"{variable.dims} {values.shape} {kind} {_in_order(variable.attrs)}"
-    return hashlib.sha256(head.encode() + b"\0" + content).hexdigest()
+    found = hashlib.sha256(head.encode() + b"\0")
+    found.update(content)
+    return found.hexdigest()
 
 
 def digest_of_attrs(attrs: Mapping[Any, Any]) -> str:
