@@ -1,10 +1,18 @@
 """Rays through convex slabs of quadrics, against points along the ray tried in turn."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from pbrdf.kernels import from_python
-from pbrdf.kernels.bodies.bodies import heights_in_cylinder, slab_interval
+from pbrdf.kernels.bodies.bodies import (
+    Bodies,
+    body_normal,
+    heights_in_cylinder,
+    slab_interval,
+)
 
 # r^2 = a + b s + c s^2 between two heights
 SLABS = {
@@ -75,3 +83,24 @@ def test_heights_of_a_line_within_a_radius():
         elif abs(inside).max() < 20.0:
             assert abs(lowest - inside.min()) < 2e-3
             assert abs(highest - inside.max()) < 2e-3
+
+
+def test_normals_of_a_stack_are_those_of_the_whole():
+    """Slices of nearly a sphere, and a body whose radius is linear in the height too."""
+    radius, cuts = 2.0, (-2.0, -0.7, 0.4, 2.0)
+    slabs = [
+        [low, high, radius**2 + 0.1 * k, 0.05 * k, -1.0 + 0.02 * k]
+        for k, (low, high) in enumerate(pairwise(cuts))
+    ]
+    tilted = [[0.0, 3.0, 1.0, 0.8, -0.3]]
+    for rows in (slabs, tilted):
+        body = Bodies(*[np.zeros(1)] * len(Bodies._fields))._replace(
+            slab_start=np.array([0, len(rows)]), slabs=np.array(rows)
+        )
+        for s in np.linspace(rows[0][0] + 0.05, rows[-1][1] - 0.05, 23):
+            _, _, a, b, c = next(row for row in rows if s <= row[1])
+            r, turn = np.sqrt(a + b * s + c * s * s), 3.0 * s
+            point = r * np.cos(turn), r * np.sin(turn), s
+            gradient = np.array([2 * point[0], 2 * point[1], -(b + 2 * c * s)])
+            expected = gradient / np.linalg.norm(gradient)
+            assert_allclose(from_python(body_normal)(body, 0, *point), expected, atol=1e-14)

@@ -187,3 +187,15 @@ def test_covariance_equals_the_normal_equations():
     matrix = np.random.default_rng(8).normal(size=(20, 3)) * [1.0, 50.0, 0.02]
     expected = np.linalg.inv(matrix.T @ matrix)
     assert_allclose(information(matrix).covariance, expected, rtol=1e-10)
+
+
+def test_directions_that_nothing_acts_on_have_no_covariance():
+    """Two columns in one direction, one of their own, one of zeros, one held."""
+    v, w = np.array([0.3, 0.0, 0.4, 0.0, 0.0]), np.array([0.0, 0.15, 0.0, 0.2, 0.0])
+    matrix = np.column_stack([1e3 * v, 0.5 * v, w, 0 * v, 7.0 * w + v])
+    found = information(matrix, [True, True, True, True, False])
+    assert_allclose(found.blind, [[0, 0, 0, 1, 0], [1, -1, 0, 0, 0]], atol=1e-12)
+    assert_allclose(found.stderr, [np.inf, np.inf, 1 / 0.25, np.inf, 0.0], rtol=1e-12)
+    assert np.isnan(found.covariance[0, 2])
+    assert found.covariance[2, 4] == 0.0
+    assert_allclose(found.length[:4], [1 / 500, 1 / 0.25, 1 / 0.25, 1.0], rtol=1e-12)

@@ -35,6 +35,7 @@ SHADOWING = "pbrdf/kernels/microfacet/shadowing.py"
 SLOPES = "pbrdf/kernels/microfacet/slopes.py"
 SCATTER = "fitting/statistics/axis/scatter.py"
 NIST = "data_io/goniometer/formats/nist.py"
+LAWS = "tests/contaminants/test_contaminant_laws.py"
 FACETS = "tests/analytic/test_slopes_and_shadowing.py"
 # Modules of physics, and the tests that are to notice what is changed in them
 JUDGED = {
@@ -51,7 +52,10 @@ JUDGED = {
     ),
     "bodies": (
         "pbrdf/kernels/bodies/bodies.py",
-        ["tests/contaminants/test_quadric_slabs.py"],
+        [
+            "tests/contaminants/test_quadric_slabs.py",
+            f"{LAWS}::test_a_sphere_in_slices_is_met_where_the_sphere_is",
+        ],
     ),
     "interfaces": (
         "pbrdf/kernels/bodies/interfaces.py",
