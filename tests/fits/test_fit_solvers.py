@@ -9,7 +9,7 @@ from scipy import optimize
 from fitting.objective.losses import LOSSES
 from fitting.objective.objective import Objective, Prediction
 from fitting.objective.parameters import Parameter, bounded_parameter
-from fitting.objective.uncertainty import information
+from fitting.objective.uncertainty import covariance_rows, information
 from fitting.problem.problem import SOLVERS
 from fitting.solvers.casadi_solver import solve_casadi
 from fitting.solvers.global_search import SEARCHES, starts
@@ -199,3 +199,31 @@ def test_directions_that_nothing_acts_on_have_no_covariance():
     assert np.isnan(found.covariance[0, 2])
     assert found.covariance[2, 4] == 0.0
     assert_allclose(found.length[:4], [1 / 500, 1 / 0.25, 1 / 0.25, 1.0], rtol=1e-12)
+
+
+def test_a_parameter_that_acts_by_its_square_has_the_error_of_the_square():
+    matrix = np.random.default_rng(4).normal(size=(12, 2))
+    x = casadi.MX.sym("x", 2)
+    curve = casadi.Function(
+        "curve", [x], [casadi.DM(matrix) @ casadi.vertcat(x[0], x[1] ** 2)]
+    )
+    parameters = [
+        Parameter(name="gain", value=1.0, prior_stderr=0.5),
+        Parameter(name="kappa", value=0.0, low=0.0, squared=True),
+    ]
+    stderr = np.full(12, 0.1)
+    objective = Objective(
+        prediction=Prediction(curve),
+        data=np.zeros(12),
+        stderr=stderr,
+        parameters=parameters,
+    )
+    # Of gain and square: normal equations with the prior's row
+    weighted = np.vstack([matrix / 0.1, [2.0, 0.0]])
+    square = np.sqrt(np.linalg.inv(weighted.T @ weighted)[1, 1])
+    for kappa in (0.0, 0.2 * np.sqrt(square), 3.0):
+        rows = covariance_rows(objective, np.array([1.0, kappa]))
+        assert rows.shape == (14, 2)
+        assert_allclose(rows[:, 0], [*matrix[:, 0] / 0.1, 2.0, 0.0], rtol=1e-12, atol=1e-12)
+        slope = max(2 * kappa, np.sqrt(square))
+        assert_allclose(rows[:12, 1], matrix[:, 1] / 0.1 * slope, rtol=1e-6)
