@@ -157,6 +157,25 @@ def test_covariance_with_white_noise_by_isserlis_sums():
         assert_allclose(found[0, row], expected, rtol=1e-12)
 
 
+def test_covariance_of_all_increments_by_isserlis_sums():
+    """Signal and noise together, every pair of lags, node by node."""
+    nodes, step, height, noise = 900, 0.5, 1.3, 0.7
+    lags = np.array([1.0, 2.5, 5.0])
+    x = np.arange(nodes) * step
+    covariance = height * np.exp(-(((x[:, None] - x) / 5.0) ** 2)) + noise * np.eye(nodes)
+    steps = [0, *np.rint(lags / step).astype(int)]
+
+    def increments(rows, k):
+        return rows[k:] - rows[:-k] if k else rows
+
+    expected = [
+        [2 * np.mean(increments(increments(covariance, j).T, k) ** 2) for k in steps]
+        for j in steps
+    ]
+    found = increment_covariance(lags, gaussian(5.0), (height, noise), Extent(x[-1], nodes))
+    assert_allclose(found, expected, rtol=0.02)
+
+
 def test_interval_of_a_gain_with_estimated_noise_is_that_of_student():
     """Six degrees of freedom: 2.447 standard errors, where the normal law has 1.960."""
     model = MicrofacetModel(Material(1.5), slope_rms=0.3)

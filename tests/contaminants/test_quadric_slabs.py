@@ -95,7 +95,8 @@ def test_normals_of_a_stack_are_those_of_the_whole():
     tilted = [[0.0, 3.0, 1.0, 0.8, -0.3]]
     for rows in (slabs, tilted):
         body = Bodies(*[np.zeros(1)] * len(Bodies._fields))._replace(
-            slab_start=np.array([0, len(rows)]), slabs=np.array(rows)
+            slab_start=np.array([0, 1, 1 + len(rows), 2 + len(rows)]),
+            slabs=np.array([[0.0, 9.0, 5.0, 0.3, 0.0], *rows, [-9.0, 9.0, 5.0, -0.3, 0.0]]),
         )
         for s in np.linspace(rows[0][0] + 0.05, rows[-1][1] - 0.05, 23):
             _, _, a, b, c = next(row for row in rows if s <= row[1])
@@ -103,4 +104,4 @@ def test_normals_of_a_stack_are_those_of_the_whole():
             point = r * np.cos(turn), r * np.sin(turn), s
             gradient = np.array([2 * point[0], 2 * point[1], -(b + 2 * c * s)])
             expected = gradient / np.linalg.norm(gradient)
-            assert_allclose(from_python(body_normal)(body, 0, *point), expected, atol=1e-14)
+            assert_allclose(from_python(body_normal)(body, 1, *point), expected, atol=1e-14)

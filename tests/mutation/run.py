@@ -64,7 +64,7 @@ JUDGED = {
     "scatter": (SCATTER, [PINS, "tests/fits/test_statistics_parts.py"]),
     "uncertainty": (
         "fitting/objective/uncertainty.py",
-        [PINS, "tests/fits/test_fit_solvers.py"],
+        ["fitting/objective/uncertainty.py", PINS, "tests/fits/test_fit_solvers.py"],
     ),
 }
 # Read once, before mutants are split off
