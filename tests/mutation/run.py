@@ -48,7 +48,7 @@ JUDGED = {
     "slopes": (SLOPES, [FACETS, PINS]),
     "facet": (
         "pbrdf/kernels/microfacet/facet.py",
-        ["tests/analytic/test_microfacet.py", FACETS],
+        ["tests/analytic/test_microfacet.py", FACETS, "tests/signs/test_signs_of_light.py"],
     ),
     "bodies": (
         "pbrdf/kernels/bodies/bodies.py",
