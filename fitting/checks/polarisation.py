@@ -152,7 +152,7 @@ def _sum_beyond(
     for half in np.unique(2 * curve[known] + (view[known] > 0)):
         here = known & (2 * curve + (view > 0) == half)
         total, light = float(value[here].sum()), float(bright[here].sum())
-        far = (abs(total) - light) / np.sqrt(np.sum(error[here] ** 2))
+        far = (abs(total) - light) / max(float(np.linalg.norm(error[here])), 1e-300)
         if far > worst:
             how = ", estimated from their scatter" if estimated else ""
             row = int(np.flatnonzero(here)[0])

@@ -24,6 +24,8 @@ from fitting.result.identifiability import identifiability_warnings, misfit_warn
 __all__ = ["result_of"]
 
 
+# Of a fit without a minimum chi2 may be too large for a number
+@np.errstate(over="ignore", invalid="ignore")
 def result_of(
     problem: Problem, solved: Solved, uncertain: Mapping[str, float]
 ) -> FitResult:

@@ -220,6 +220,7 @@ class Misfit:
         return pd.DataFrame(rows)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def misfit_of(
     readings: "xr.Dataset",
     m00: np.ndarray,
