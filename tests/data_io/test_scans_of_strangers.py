@@ -226,3 +226,22 @@ def test_light_that_columns_tell_twice_counts_once(tmp_path):
     assert count == {"I_s": 29, "I_p": 29, "M00": 1, "M10": 1}
     scan = read(tmp_path, write(view, table, ("M00", "M10", "I_s")))
     assert set(observe({"scan": scan}).names) == {"M00", "M10"}
+
+
+@pytest.mark.parametrize(
+    ("name", "cures"),
+    [
+        ("BRF [1/sr]", ("BRF=reflectance-factor", "BRF=M00")),
+        ("m10 [sr-1]", ("m10=m10", "m10=M10")),
+    ],
+)
+def test_a_unit_that_belies_its_name_is_refused(tmp_path, name, cures):
+    """Factors and ratios have no unit: BRF [1/sr] was divided by pi."""
+    path = tmp_path / "scan.csv"
+    path.write_text(
+        f"theta_i_deg,theta_view_deg,M11,{name}\n30,10,.01,0.05\n30,20,.01,.06\n"
+    )
+    with pytest.raises(DataFileError, match="no unit by its name") as refused:
+        read_goniometer(path)
+    for cure in cures:
+        assert cure in str(refused.value)

@@ -90,5 +90,6 @@ def _text(path: Path) -> str | None:
         return None
     mark = content[:2]
     code = "utf-16" if mark in (b"\xff\xfe", b"\xfe\xff") else "latin-1"
-    text = content.decode(code, errors="replace")
+    # A mark of byte order is nothing wherever it stands
+    text = content.decode(code, errors="replace").replace("\ufeff", "")
     return None if path.suffix in (".bsdf", ".toml") else text

@@ -168,7 +168,9 @@ def _value(plain: str, bracket: str) -> Meaning | None:
         name = f"m{divided[1] or divided[2]}"
     # Case tells M10 in 1/sr from m10, which is divided by M00
     known = name if name in VALUES else _SAME_VALUE.get(re.sub(r"\s+", "_", name.lower()))
-    if known is None:
+    # BRF [1/sr] is pi times a BRDF by its name, a BRDF by its unit
+    without_unit = known in ("reflectance-factor", "DOLP") or str(known).startswith("m")
+    if known is None or ("sr" in bracket and without_unit and known != "m00"):
         return None
     return Meaning(known, "%" if bracket == "%" else None, stderr)
 

@@ -112,6 +112,11 @@ def _of_unit(name: str) -> str:
         return ""
     if meaning.name in ANGLES:
         return f"{name} is no angle in degrees or radians: convert it."
+    if "sr" in name.removeprefix(bare):
+        cure = f"--columns {bare}={meaning.name} or {bare}=M00 with --quantity brdf"
+        if meaning.name.startswith("m"):
+            cure = f"--columns {bare}={meaning.name} or {bare}={meaning.name.upper()}"
+        return f"{name} has no unit by its name, and that of a BRDF behind it: give {cure}."
     return (
         f"{name} is not in 1/sr: give --columns {bare}={bare} with --quantity relative, or "
         "what it is."
