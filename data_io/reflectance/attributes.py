@@ -25,7 +25,7 @@ def digest(variable: xr.Variable) -> str:
     values = np.ascontiguousarray(variable.to_numpy())
     text = values.dtype.kind in "OTU"
     held = values.reshape(-1)
-    content = "\0".join(map(str, held)).encode() if text else held.view(np.uint8)
+    content = "\0".join(map(str, held)).encode() if text else held.view(np.uint8).data
     kind = "text" if text else values.dtype.str
     head = f"{variable.dims} {values.shape} {kind} {_in_order(variable.attrs)}"
     found = hashlib.sha256(head.encode() + b"\0")
