@@ -332,9 +332,18 @@ def test_the_command_wants_one_surface(
         {"M00": ("geometry", brdf)}, {k: ("geometry", v) for k, v in coords.items()}
     )
     write_goniometer(data, tmp_path / "scan.csv")
+    paint = ["--n", "1.5", "--slope-rms", "0.2"]
+    waves = ["--n", "1.5", "--height-rms-um", "0.1", "--corr-length-um", "2"]
     for options, message in (
         (["--n", "1.5"], "--slope-rms must be given, got none"),
-        (["--n", "1.5", "--scene", "none.toml"], "come from the --scene, got both"),
+        (["--n", "1.5", "--scene", "none.toml"], "--n is not used beside --scene"),
+        (["--shadowing", "smith", "--scene", "none.toml"], "--shadowing is not used"),
+        ([*paint, "--seed", "3"], "--seed is not used without --scene"),
+        ([*paint, "--reach", "3"], "--reach is not used without --height-rms-um"),
+        (
+            [*waves, "--shadowing", "smith"],
+            "--shadowing is not used beside --height-rms-um",
+        ),
         (
             ["--n", "1.5", "--slope-rms", "0.2", "--slope-distribution", "odd"],
             "--slope-distribution must be one of gaussian",

@@ -8,6 +8,7 @@ import typer
 
 from pbrdf.cli import declaring, option_text, options
 from pbrdf.cli.typed import words_typed
+from pbrdf.cli.unused import refuse_unused
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 
 def command(
+    context: typer.Context,
     scans: Annotated[
         list[Path],
         typer.Argument(
@@ -111,7 +113,7 @@ def command(
 
     Example: pbrdf fit scan.csv --n 1.53 --slope-rms 0.252
     """
-    given = dict(locals())
+    given = {name: value for name, value in locals().items() if name != "context"}
     from pbrdf.cli.progress import progress_bar
     from pbrdf.cli.reading import read_material
     from pbrdf.cli.staging import answer, staged_folder
@@ -128,15 +130,13 @@ def command(
     with progress_bar("tracing") as progress:
         model: MicrofacetModel | SimulatedModel | WaveSurface
         heights = height_rms, corr_length, reach
+        _check_used(context, scene, heights)
         if scene is None:
             ignored = option_text.names(material_ignore)
             material = read_material(n, kappa, material_file, ignored)
             rules = {"shadowing": shadowing, "slope_distribution": slope_distribution}
             model = _closed_form(material, slope_rms, rules, heights)
         else:
-            _check_alone(
-                n, slope_rms, slope_distribution, material_file, height_rms, corr_length
-            )
             traced = {
                 "n_rays": n_rays, "realizations": realizations, "seed": seed,
                 "workers": workers, "progress": progress,
@@ -168,11 +168,29 @@ def command(
         raise typer.Exit(1)
 
 
-def _check_alone(*given: float | str | None) -> None:
-    """Refuse beside a scene what it has itself."""
-    if any(value is not None for value in given):
-        msg = "--n, slopes and heights come from the --scene, got both. Leave one out."
-        raise ValueError(msg)
+# Parameters that describe a surface for the closed form, those of waves, and of a tracing
+_OF_SLOPE = {"slope_rms", "slope_distribution", "shadowing", "slope_stderr"}
+_OF_WAVES = {"height_rms", "corr_length", "reach"}
+_OF_MATERIAL = {"n", "kappa", "material_file", "material_ignore"}
+_OF_TRACING = {"n_rays", "realizations", "seed", "workers"}
+
+
+def _check_used(
+    context: typer.Context,
+    scene: Path | None,
+    heights: tuple[float | None, float | None, float],
+) -> None:
+    """Refuse what has no part in the model that the other options choose."""
+    if scene is not None:
+        held = (_OF_SLOPE - {"slope_stderr"}) | _OF_WAVES | _OF_MATERIAL
+        refuse_unused(context, held, "beside --scene, which has a surface of its own")
+        return
+    refuse_unused(context, _OF_TRACING, "without --scene: nothing is traced")
+    if heights[:2] == (None, None):
+        refuse_unused(context, {"reach"}, "without --height-rms-um")
+    else:
+        made = "beside --height-rms-um: height and length make the slope"
+        refuse_unused(context, _OF_SLOPE, made)
 
 
 def _read_scans(
@@ -237,13 +255,6 @@ def _closed_form(
         if value is None:
             msg = f"{option} must be given where waves are fitted, got none."
             raise ValueError(msg)
-    if slope_rms is not None or rules["slope_distribution"] is not None:
-        option = "--slope-distribution" if slope_rms is None else "--slope-rms"
-        msg = (
-            f"{option} must be left out beside --height-rms-um, got "
-            f"{slope_rms or rules['slope_distribution']}: height and length make the slope."
-        )
-        raise ValueError(msg)
     assert material is not None  # looked at above
     model = WaveModel(material, height_rms=height_rms, corr_length=corr_length)
     return WaveSurface(model, reach=reach)
