@@ -12,6 +12,7 @@ __all__ = [
     "incidences",
     "names",
     "numbers",
+    "picture",
     "recorded",
     "result_file",
     "wavelengths",
@@ -57,6 +58,27 @@ def result_file(target: Path) -> Path:
         msg = (
             "--output must end in .nc (netCDF) or .zarr (a store), got "
             f"{target.name!r}. No other is written."
+        )
+        raise ValueError(msg)
+    return target
+
+
+def picture(target: Path, option: str = "--output") -> Path:
+    """Return the name of a figure.
+
+    Raises
+    ------
+    ValueError
+        If its ending is none that figures are written by.
+    """
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    known = FigureCanvasBase.get_supported_filetypes()
+    if target.suffix[1:].lower() not in known:
+        others = ", ".join(f".{end}" for end in known if end not in ("png", "pdf", "svg"))
+        msg = (
+            f"{option} must end in .png, .pdf, .svg or another of {others}, got "
+            f"{str(target)!r}."
         )
         raise ValueError(msg)
     return target

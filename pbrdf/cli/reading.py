@@ -214,15 +214,12 @@ def read_store(
         If a word is no NAME=VALUE, or the store has no such place.
     """
     from pbrdf import from_store
+    from pbrdf.cli.places import written_places
 
-    places: dict[str, Any] = {}
-    for text in at or ():
-        name, equals, value = text.partition("=")
-        if not equals or not name.strip() or name.strip() in places:
-            msg = f"--at must be NAME=VALUE, once for each name, got {text!r}."
+    places = written_places(at)
+    if "wavelength" in places:
+        if wavelength is not None:
+            msg = "--wavelength-um must be given once, got it in --at too. Leave one out."
             raise ValueError(msg)
-        try:
-            places[name.strip()] = float(value)
-        except ValueError:
-            places[name.strip()] = value.strip()
+        wavelength = places.pop("wavelength")
     return from_store(path).at(theta_i, wavelength, **places)

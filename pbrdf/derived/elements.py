@@ -61,7 +61,8 @@ def element(result: xr.Dataset, name: str, source: npt.ArrayLike = _LIGHT) -> El
     adds to M10, so this overstates the error of a DOLP.
     """
     if name not in NAMES:
-        msg = f"elements must be one of {', '.join(NAMES)}, got {name!r}."
+        meant = f" Did you mean {name.upper()}?" if name.upper() in NAMES else ""
+        msg = f"elements must be one of {', '.join(NAMES)}, got {name!r}.{meant}"
         raise ValueError(msg)
     if name[0] == "M":
         out, into = (_STOKES[int(digit)] for digit in name[1:])

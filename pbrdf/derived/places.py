@@ -48,6 +48,8 @@ def choose(result: xr.Dataset, places: Mapping[str, Any]) -> xr.Dataset:
         known = np.atleast_1d(result[name].values)
         if known.dtype.kind in "US":
             here = np.flatnonzero(known == str(value))
+        elif isinstance(value, str):
+            here = np.empty(0, int)
         else:
             here = np.flatnonzero(np.isclose(known, value, rtol=1e-6, atol=1e-9))
         if not here.size:
@@ -57,8 +59,9 @@ def choose(result: xr.Dataset, places: Mapping[str, Any]) -> xr.Dataset:
                 f"{in_words(name, value)}."
             )
             raise ValueError(msg)
-        if name in result.dims:
-            result = result.isel({name: int(here[0])})
+        if result[name].dims:
+            # A coordinate along another dimension, as contact_angle along state, cuts that
+            result = result.isel({result[name].dims[0]: int(here[0])})
     return result
 
 

@@ -11,6 +11,7 @@ from fitting import surface_statistics
 from fitting.report.surface import surface_figure
 from pbrdf import GaussianSurface
 from pbrdf.cli import main
+from pbrdf.derived.places import choose
 from pbrdf.plots import hemisphere, new_figure, plane_cuts, scan_figure
 from pbrdf.plots.limits import reach_of
 from pbrdf.plots.scans import residuals
@@ -193,8 +194,18 @@ def test_the_command_draws_only_what_was_computed(tmp_path, capsys):
     for wrong, words in (
         (["--theta-i-deg", "90", "--wavelength-um", "0.45"], "got 90 deg"),
         (["--wavelength-um", "5"], "one of 0.45 um, 0.85 um"),
-        ([], "--at must be given once for each further dimension"),
+        ([], "Give --wavelength-um, one of 0.45 um, 0.85 um"),
+        (["--theta-i-deg", "40"], "got 40 deg"),
         (["--at", "wavelength=0.5"], "got 0.5 um"),
+        (["--at", "wavelength_um=0.5"], "got 0.5 um"),
+        (["--at", "theta_i=51.5"], "theta_i of value 51.5. Give --theta-i-deg"),
+        (["--at", "theta_i_deg=51.5"], "Give --theta-i-deg"),
+        (["--at", "phi_i=1"], "phi_i_deg=VALUE"),
+        (["--at", "dphi=0"], "must not name what the figure shows"),
+        (["--at", "slope=1"], "further dimension of the result, here none, got 'slope'"),
+        (["--at", "wavelength=0.45", "--at", "wavelength_um=0.85"], "once for each name"),
+        (["--at", "wavelength=0.45", "--wavelength-um", "0.85"], "must be given once"),
+        (["--at", "wavelength=0.45", "--elements", "m10"], "Did you mean M10?"),
         (["--at", "wavelength=0.45", "--elements", "M99"], "--elements must be one of"),
     ):
         assert main(["plot", source, *wrong, "-o", str(target)]) == 2
@@ -203,6 +214,35 @@ def test_the_command_draws_only_what_was_computed(tmp_path, capsys):
     good = ["--at", "wavelength=0.85", "--elements", "M10,M33", "--width-mm", "85"]
     assert main(["plot", source, *good, "--scale", "symlog", "-o", str(target)]) == 0
     assert target.read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize("name", ["-", "noext", "figure.xyz"])
+def test_a_figure_has_an_ending_that_figures_have(tmp_path, monkeypatch, capsys, name):
+    monkeypatch.chdir(tmp_path)
+    write_result(hand_made(), tmp_path / "r.nc")
+    assert main(["plot", "r.nc", "--wavelength-um", "0.45", "-o", name]) == 2
+    told = capsys.readouterr().err
+    assert "--output must end in .png" in told
+    assert repr(name) in told
+    assert "part-" not in told
+
+
+def test_a_state_is_chosen_by_its_contact_angle(tmp_path, capsys):
+    one = hand_made().isel(wavelength=0, theta_i=0)
+    states = states_of(one).assign_coords(
+        contact_angle=("state", [np.nan, 0.2, 3.0], {"units": "rad"})
+    )
+    cut = choose(states, {"contact_angle": 0.2})
+    assert str(cut.state.values) == "15 deg"
+    write_result(states, tmp_path / "r.nc")
+    for place, words in (
+        ("contact_angle=0.2", "contact_angle_deg=VALUE"),
+        ("contact_angle_deg=0.2", "contact_angle must be one of"),
+        ("state=wet", "state must be one of dry, 15 deg, 179 deg"),
+        ("theta_i=17", "Give --theta-i-deg"),
+    ):
+        assert main(["plot", str(tmp_path / "r.nc"), "--at", place]) == 2
+        assert words in capsys.readouterr().err
 
 
 def test_histograms_agree_with_the_table():

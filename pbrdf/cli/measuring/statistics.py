@@ -93,6 +93,8 @@ def command(
         "material": material,
         "direction": direction,
     }
+    if figure is not None:
+        option_text.picture(figure, "--figure")
     heights = read_surface(
         surface, kind=kind, um_per_pixel=um_per_pixel, spacing=spacing, unit=unit,
         channel=channel, columns=columns, block=block, um_per_level=um_per_level,

@@ -10,7 +10,6 @@ import typer
 from pbrdf.cli import declaring, option_text, options
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.figure import Figure
 
 
@@ -83,15 +82,18 @@ def command(
     Example: pbrdf plot result.nc --theta-i-deg 60 -o result.png
     """
     import data_io
+    from pbrdf.cli.places import places_in, written_places
     from pbrdf.cli.reading import read_scan
     from pbrdf.cli.staging import staged_file
     from pbrdf.plots import hemisphere, plane_cuts, scan_figure
 
-    target = output or source.with_suffix(".png")
+    target = option_text.picture(output or source.with_suffix(".png"))
     with staged_file(target, force=force) as stage:
         if source.suffix == ".nc" or data_io.is_result_store(source):
             result = data_io.read_result(source)
-            places = _places(result, theta_i, wavelength, at, one=not plane)
+            places = places_in(
+                result, theta_i, wavelength, written_places(at), one=not plane
+            )
             names = option_text.names(elements)
             if plane:
                 figure = plane_cuts(
@@ -151,53 +153,3 @@ def _of_store(
         if name in here.dims
     }
     return hemisphere(here, elements, fold=False, places=first, **look)
-
-
-def _place(text: str) -> tuple[str, float]:
-    """Return dimension and value of NAME=VALUE; azimuths become radians."""
-    name, _, value = text.partition("=")
-    numbers = option_text.numbers(value, f"--at {name}")
-    if len(numbers) != 1:
-        msg = f"--at must be NAME=VALUE, got {text!r}."
-        raise ValueError(msg)
-    number = numbers[0]
-    return ("phi_i", math.radians(number)) if name == "phi_i_deg" else (name, number)
-
-
-def _places(
-    result: "xr.Dataset",
-    theta_i: float | None,
-    wavelength: float | None,
-    at: "list[str] | None",
-    *,
-    one: bool,
-) -> dict[str, float]:
-    """Return where to cut; of one hemisphere each dimension needs a place."""
-    from pbrdf.derived.elements import mueller
-
-    value, _ = mueller(result)
-    places = dict(_place(text) for text in at or ())
-    if theta_i is not None:
-        places["theta_i"] = math.radians(theta_i)
-    elif one and "theta_i" in value.dims:
-        places["theta_i"] = float(result.theta_i.values[0])
-    if wavelength is not None:
-        if "wavelength" not in result.coords:
-            msg = (
-                "--wavelength-um must be left out, the result names no wavelength, got "
-                f"{wavelength:g}."
-            )
-            raise ValueError(msg)
-        places["wavelength"] = wavelength
-    own = ("theta_i", "theta_s", "dphi", "stokes_out", "stokes_in", "state")
-    further = [str(d) for d in value.dims if d not in own and value.sizes[d] > 1]
-    lacking = [name for name in further if name not in places] if one else []
-    strange = [name for name in places if name not in result.coords]
-    if lacking or strange:
-        named = ["phi_i_deg" if name == "phi_i" else name for name in further]
-        msg = (
-            "--at must be given once for each further dimension of the result, "
-            f"{', '.join(named) or 'here none'}, got {', '.join(places) or 'none'}."
-        )
-        raise ValueError(msg)
-    return places
