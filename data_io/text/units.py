@@ -55,7 +55,21 @@ _NAME = r"([A-Za-zµμÅå]+)"
 _UNIT_IN_HEADER = re.compile(
     rf"_{_NAME}\b|[\[(]\s*{_NAME}\s*[\])]|/\s*{_NAME}\b|\bunits?\s*[:=]\s*{_NAME}\b"
 )
-_AXIS_UNIT = re.compile(rf"\b([xyz])[ _-]*units?\s*[:=]\s*{_NAME}", re.IGNORECASE)
+# What a remark says of an axis: "X unit: mm", "x, y in um", "height in nm", "z [nm]"
+_HEIGHTS = "height heights elevation elevations depth depths topography value values data"
+_AXIS = rf"(?:xy|[xyz]|laterally|lateral|{'|'.join(_HEIGHTS.split())})"
+_SAID = rf"\s*(?:[:=]|(?:(?:are|is)\s+)?(?:(?:given|measured|stored)\s+)?\bin\b)\s*{_NAME}"
+_AXIS_UNIT = re.compile(
+    rf"(?<![A-Za-z])({_AXIS}(?:\s*(?:,|and|&)\s*{_AXIS})*)"
+    r"(?:[ _-]*(?:units?|values?|data|coordinates?|axis|axes))*"
+    rf"(?:{_SAID}|\s*[\[(]\s*{_NAME}\s*[\])]|_{_NAME}|\s*/\s*{_NAME})(?!\w)",
+    re.IGNORECASE,
+)
+_ALL_UNITS = re.compile(
+    rf"(?:(?:^|[#%,;(])\s*units?|\b(?:lengths|everything|all(?: \w+)?)){_SAID}(?!\w)",
+    re.IGNORECASE,
+)
+_UNIT_OF = re.compile(r"\bunits? of (?:the )?", re.IGNORECASE)
 
 
 def normalise_unit(name: str) -> str:
@@ -116,14 +130,59 @@ def header_units(text: str) -> list[str]:
     return [unit for unit in found if unit in LENGTH_UNITS]
 
 
-def axis_units(texts: list[str]) -> dict[str, str]:
-    """Return what lines such as "X unit: mm" say, by axis."""
-    found = {
-        axis.lower(): normalise_unit(name)
-        for text in texts
-        for axis, name in _AXIS_UNIT.findall(text)
-    }
-    return {axis: unit for axis, unit in found.items() if unit in LENGTH_UNITS}
+def axis_units(path: str | Path, texts: list[str]) -> dict[str, str]:
+    """Return what lines such as "X unit: mm" or "height in nm" say, by axis.
+
+    Raises
+    ------
+    DataFileError
+        If they name two units of one axis.
+
+    Examples
+    --------
+    >>> axis_units("map.csv", ["# x, y in um, height in nm, step 1 um"])
+    {'x': 'um', 'y': 'um', 'z': 'nm'}
+    """
+    found: dict[str, str] = {}
+    for text in texts:
+        for names, *units in _AXIS_UNIT.findall(_UNIT_OF.sub("", text)):
+            unit = normalise_unit("".join(units))
+            if unit not in LENGTH_UNITS:
+                continue
+            for name in re.split(r"\s*(?:,|and\b|&)\s*", names.lower()):
+                plane = name.startswith(("xy", "lateral"))
+                for axis in "xy" if plane else name if name in ("x", "y") else "z":
+                    known = found.setdefault(axis, unit)
+                    _check_one(path, f"unit of {axis}", {known, unit})
+    return found
+
+
+def height_unit(path: str | Path, texts: list[str]) -> str | None:
+    """Return the unit of the heights of a matrix that remarks of its header name.
+
+    Raises
+    ------
+    DataFileError
+        If they name several.
+    """
+    units = {u for axis, u in axis_units(path, texts).items() if axis == "z"}
+    units |= common_units(texts)
+    _check_one(path, "unit of heights", units)
+    return next(iter(units), None)
+
+
+def common_units(texts: list[str]) -> set[str]:
+    """Return the units of everything that remarks name: "unit: nm", "all in um"."""
+    rest = [_AXIS_UNIT.sub("", _UNIT_OF.sub("", text)) for text in texts]
+    said = (normalise_unit(name) for text in rest for name in _ALL_UNITS.findall(text))
+    return {unit for unit in said if unit in LENGTH_UNITS}
+
+
+def _check_one(path: str | Path, what: str, units: set[str]) -> None:
+    """Refuse units of different size."""
+    if len({LENGTH_UNITS[unit] for unit in units}) > 1:
+        problem = f"expected one {what}, the header names {', '.join(sorted(units))}"
+        raise DataFileError(path, problem, "Mend the header.")
 
 
 def sole_unit(path: str | Path, texts: list[str]) -> str | None:
@@ -135,6 +194,7 @@ def sole_unit(path: str | Path, texts: list[str]) -> str | None:
         t for t in texts if re.search(r"\bunits?\b", t, re.I) or not re.search(r"\d", t)
     ]
     units = {unit for text in about for unit in header_units(text)}
+    units |= common_units(texts)
     if len(units) > 1:
         problem = f"expected units that belong to columns, got {', '.join(sorted(units))}"
         raise DataFileError(path, problem, "Head the columns, for example x_um,z_nm.")

@@ -32,6 +32,10 @@ _ROLES = {
 _BRACKETS = re.compile(r"\[([^\]]*)\]|\(([^)]*)\)|<([^>]*)>|\{([^}]*)\}")
 _SPLIT = re.compile(r"(?:^|\s)in\s+(\S+)\s*$|/\s*(\S+)\s*$|[_\s]([^\s_]+)\s*$")
 
+_SETTING = re.compile(
+    r"\b(?:step|spacing|pitch|sampling)\b[^,;\t]*?\b\d[\d.]*\s*[a-zµμ]+\b", re.IGNORECASE
+)
+
 
 @dataclass(frozen=True)
 class Column:
@@ -154,7 +158,8 @@ def _names(text: str, width: int, delimiter: str | None) -> list[str] | None:
     """Split a line of the header into as many names as there are columns."""
     text = text.strip().lstrip("".join(COMMENT_MARKS)).strip()
     text = re.sub(r"^columns?\s*:\s*", "", text, flags=re.IGNORECASE)
-    if not re.search(r"[^\W\d_]", text):
+    # A remark with a setting: "height in nm, step 1 um"
+    if not re.search(r"[^\W\d_]", text) or _SETTING.search(text):
         return None
     ways = [delimiter, "\t", ";", ","] if delimiter else ["\t", ";", ","]
     for mark in dict.fromkeys([*ways, None]):

@@ -170,15 +170,17 @@ def asked_columns(
 def stated_units(path: str | Path, header: list[Line]) -> tuple[str | None, str | None]:
     """Return the length units of x and z that lines of the header name in words."""
     texts = [line.text for line in header]
-    by_axis = axis_units(texts)
-    if by_axis:
-        return by_axis.get("x"), by_axis.get("z", by_axis.get("y"))
+    by_axis = axis_units(path, texts)
+    value = by_axis.get("z", by_axis.get("y"))
+    if "x" in by_axis and value:
+        return by_axis["x"], value
     for text in reversed(texts):
         units = header_units(text)
         if len(units) == 2:
             return units[0], units[1]
     common = sole_unit(path, texts)
-    return common, common
+    # The unit of one axis says nothing of the other
+    return (by_axis.get("x"), value) if by_axis else (common, common)
 
 
 def column_sizes(

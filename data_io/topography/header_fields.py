@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from data_io.text.text import Line
-from data_io.text.units import LENGTH_UNITS, normalise_unit, unit_factor
+from data_io.text.units import LENGTH_UNITS, height_unit, normalise_unit, unit_factor
 from pbrdf.errors import DataFileError
 
 # "# spacing_um = 0.5", "# dx_um: 0.5", and, as Gwyddion writes them, "# Width: 10.0 µm",
@@ -35,6 +35,12 @@ _STEP = re.compile(
     r"[_\s]*[\[(]?\s*([A-Za-zµμ]*)\s*[\])]?\s*[:=,;\t]\s*(.+?)[,;\s]*$",
     re.IGNORECASE,
 )
+# In the middle of a remark: "height in nm, step 1 um", "pixel size of 0.5 um"
+_STEP_SAID = re.compile(
+    r"\b(?:step|spacing|pitch|pixel|sampling|increment)s?(?:\s+(?:size|width|interval|"
+    r"distance))?\s*(?:of|is|[:=])?\s*(\d[\d.]*(?:e[-+]?\d+)?)\s*([A-Za-zµμÅå]+)(?!\w)",
+    re.IGNORECASE,
+)
 
 
 def matrix_header(
@@ -55,9 +61,38 @@ def matrix_header(
             found[key] = _length(path, line, key, unit_of_name, value)
     dx = found.get("dx", found.get("spacing"))
     dy = found.get("dy", found.get("spacing", dx))
+    if dx is None:
+        dx = dy = said_step(path, header)
     if dx is None and {"width", "height"} <= found.keys():
         dx, dy = found["width"] / shape[1], found["height"] / shape[0]
+    said = height_unit(path, [line.text for line in header])
+    if said is not None and factor not in (None, unit_factor(said)):
+        problem = f"expected one unit of heights, the header names {said} and another"
+        raise DataFileError(path, problem, "Mend the header.")
+    if said is not None:
+        factor = unit_factor(said)
     return (None if dx is None or dy is None else (dx, dy)), factor
+
+
+def said_step(path: str | Path, header: list[Line]) -> float | None:
+    """Return the one step of a grid that remarks name in passing. [um]
+
+    Raises
+    ------
+    DataFileError
+        If they name several.
+    """
+    steps = {
+        float(value) * unit_factor(unit)
+        for line in header
+        for value, unit in _STEP_SAID.findall(line.text)
+        if normalise_unit(unit) in LENGTH_UNITS
+    }
+    if len(steps) > 1:
+        named = ", ".join(f"{step:g}" for step in sorted(steps))
+        problem = f"expected one step of the grid, the header names {named} um"
+        raise DataFileError(path, problem, "Write '# dx_um = ...' and '# dy_um = ...'.")
+    return next(iter(steps), None)
 
 
 def profile_step(path: str | Path, header: list[Line]) -> float | None:
@@ -66,7 +101,7 @@ def profile_step(path: str | Path, header: list[Line]) -> float | None:
         match = _STEP.match(line.text)
         if match and re.match(r"[-+.\d]", match[3]):
             return _length(path, line, match[1].strip().lower(), match[2], match[3])
-    return None
+    return said_step(path, header)
 
 
 def _length_unit(path: str | Path, line: Line, key: str, value: str) -> str:

@@ -96,10 +96,14 @@ def read_text_map(
     if factor is not None and unit is not None and factor != unit_factor(unit):
         problem = f"expected the unit that was given, {unit}, the header says another"
         raise DataFileError(path, problem, "Leave the argument out or mend the header.")
-    factor = unit_factor(unit or "um") if factor is None else factor
+    size = unit_factor(unit or "um") if factor is None else factor
     if steps is None or spacing is None or np.allclose(steps, spacing):
-        return build_map(path, rows * factor, steps or known_steps(path, spacing))
-    return with_spacing(path, build_map(path, rows * factor, steps), spacing)
+        found_map = build_map(path, rows * size, steps or known_steps(path, spacing))
+    else:
+        found_map = with_spacing(path, build_map(path, rows * size, steps), spacing)
+    if factor is None and unit is None:
+        warn_missing_unit(path, stacklevel=6)
+    return found_map
 
 
 def _axes(columns: list[Column] | None) -> list[Column] | None:
@@ -136,10 +140,6 @@ def _read_list(
     units = _list_units(path, header, axes)
     if not units and unit is None:
         warn_missing_unit(path, stacklevel=7)
-    if len(units) not in (0, 1, 3):
-        problem = f"expected a unit for each of x, y, z, got {units}"
-        cure = "Write x_um,y_um,z_um or another unit of each."
-        raise DataFileError(path, problem, cure, line=header[-1].number)
     if units and unit is not None:
         problem = f"expected no unit argument, the header says {', '.join(units)}"
         cure = "Leave the argument out."
@@ -178,13 +178,19 @@ def _list_units(path: Path, header: list[Line], axes: list[Column]) -> list[str]
             raise DataFileError(
                 path, problem, cure, line=header[-1].number, column=column.name
             )
-    found = [column.unit for column in axes if column.unit]
-    if found:
-        return found
+    named = [column.unit for column in axes if column.unit]
+    if len(named) == 3:
+        return named
+    found = {c.role: c.unit for c in axes if c.unit and c.role in ("x", "y", "z")}
     texts = [line.text for line in header]
-    by_axis = axis_units(texts)
-    if by_axis:
-        return [by_axis[axis] for axis in "xyz" if axis in by_axis]
+    by_axis = axis_units(path, texts) | found
+    if len(by_axis) == 3:
+        return [by_axis[axis] for axis in "xyz"]
+    if by_axis or named:
+        said = ", ".join(f"{axis} in {unit}" for axis, unit in by_axis.items())
+        problem = f"expected a unit for each of x, y, z, the header says {said or named}"
+        cure = "Head the columns x_um,y_um,z_um, or another unit of each."
+        raise DataFileError(path, problem, cure, line=header[-1].number)
     common = sole_unit(path, texts)
     return [common] if common else []
 

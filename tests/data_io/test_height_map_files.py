@@ -85,8 +85,8 @@ def write_x3p(path, **options):
 @pytest.mark.parametrize(
     ("text", "options"),
     [
-        (matrix_text(), {"spacing": (0.5, 0.2)}),
-        ("# dx_um = 0.5\n# dy_um = 0.2\n" + matrix_text(delimiter="\t"), {}),
+        (matrix_text(), {"spacing": (0.5, 0.2), "unit": "um"}),
+        ("# dx_um = 0.5\n# dy_um = 0.2\n" + matrix_text(delimiter="\t"), {"unit": "um"}),
         ("# dx_nm: 500\n# dy_nm: 200\n# unit: nm\n" + matrix_text(1e3, " "), {}),
         (
             "# Channel: H\n# Width: 2 µm\n# Height: 600 nm\n# Value units: m\n"
@@ -114,11 +114,62 @@ def test_text_layouts_give_the_same_map(tmp_path, text, options):
     assert not surface.periodic
 
 
-def test_a_list_without_unit_is_micrometres_and_says_so(tmp_path):
-    path = write(tmp_path, list_text().partition("\n")[2], "map.xyz")
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [(list_text().partition("\n")[2], {}), (matrix_text(), {"spacing": (0.5, 0.2)})],
+    ids=["list", "matrix"],
+)
+def test_a_map_without_unit_is_micrometres_and_says_so(tmp_path, text, options):
+    path = write(tmp_path, text, "map.xyz")
     with pytest.warns(MissingUnitWarning, match=r"map\.xyz.*micrometres") as caught:
-        assert_allclose(read_height_map(path).heights, ROWS.T)
+        assert_allclose(read_height_map(path, **options).heights, ROWS.T)
     assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize(
+    "remark",
+    [
+        "# height in nm, step 1 um",
+        "# z [nm], pixel size of 1 um",
+        "# a steel, unit: nm; spacing 1.0 um",
+        "# heights are given in nanometres (sampling interval 1 um)",
+        "# Unit of height: nm, step = 1e3 nm",
+        "# lateral unit: um, heights (nm), step 1 um",
+        "# x, y in um and z in nm, pitch: 1 um",
+        "# all values in nm; step 1 um",
+    ],
+)
+def test_a_remark_tells_unit_and_step_of_a_matrix(tmp_path, remark):
+    path = write(tmp_path, f"{remark}\n" + matrix_text(1e3))
+    surface = read_height_map(path)
+    assert_allclose(surface.heights, ROWS.T, rtol=1e-12)
+    assert surface.spacing == (1.0, 1.0)
+    assert_allclose(read_height_map(path, spacing=1.0, unit="nm").heights, ROWS.T)
+    with pytest.raises(DataFileError, match="the unit that was given, um"):
+        read_height_map(path, unit="um")
+    with pytest.raises(DataFileError, match="names its own: 1 x 1 um"):
+        read_height_map(path, spacing=0.5)
+
+
+@pytest.mark.parametrize(
+    ("remarks", "message"),
+    [
+        ("# height in nm\n# z [um]\n", "one unit of z, the header names nm, um"),
+        ("# unit: nm\n# height in um\n", "one unit of heights"),
+        ("# step 1 um, step 2 um\n", "one step of the grid, the header names 1, 2 um"),
+    ],
+)
+def test_remarks_that_contradict_each_other_are_refused(tmp_path, remarks, message):
+    with pytest.raises(DataFileError, match=message):
+        read_height_map(write(tmp_path, remarks + matrix_text()), unit="nm")
+
+
+def test_a_unit_of_one_axis_is_not_taken_for_the_others(tmp_path):
+    rows = list_text().partition("\n")[2]
+    with pytest.raises(DataFileError, match="each of x, y, z, the header says z in nm"):
+        read_height_map(write(tmp_path, "# height in nm\n" + rows, "map.xyz"))
+    whole = write(tmp_path, "# x, y in um, height in nm\n" + rows, "map.xyz")
+    assert_allclose(read_height_map(whole).heights, ROWS.T / 1e3)
 
 
 @pytest.mark.filterwarnings("ignore::data_io.ScaleWarning", "ignore::data_io.MendWarning")

@@ -181,3 +181,20 @@ def test_measured_profiles(shared, name, unit, points, length):
     assert profile.size == points
     assert_allclose(profile.length, length, rtol=1e-12)
     assert profile.evenly_spaced == (points != 76)
+
+
+def test_a_remark_is_no_pair_of_names_and_one_unit_not_both(tmp_path):
+    path = tmp_path / "edge.csv"
+    path.write_text("# height in nm, step 1 um\n0,10\n1,40\n2,20\n")
+    with pytest.raises(DataFileError, match="unit for both columns, the header names nm"):
+        read_profile(path)
+    assert_allclose(read_profile(path, unit=("um", "nm")).z, [0.01, 0.04, 0.02])
+    with pytest.raises(DataFileError, match="expected the unit given, um"):
+        read_profile(path, unit="um")
+    path.write_text("# x in um, height in nm, step 1 um\n0,10\n1,40\n2,20\n")
+    found = read_profile(path)
+    assert_allclose(found.x, [0, 1, 2])
+    assert_allclose(found.z, [0.01, 0.04, 0.02])
+    path.write_text("# heights in nm, step 2 um\n10\n40\n20\n")
+    assert_allclose(read_profile(path).x, [0, 2, 4])
+    assert_allclose(read_profile(path).z, [0.01, 0.04, 0.02])

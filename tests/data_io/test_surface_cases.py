@@ -216,7 +216,9 @@ def test_instruments_meshes_pictures_and_arrays_hold_one_map():
         with pytest.raises(DataFileError, match="um_per_level="):
             read_height_map(CASES / name)
     for name in ("inf.npy", "inf.csv"):
-        found = read_height_map(CASES / name, **({"spacing": 0.5} if "npy" in name else {}))
+        found = read_height_map(
+            CASES / name, **({"spacing": 0.5} if "npy" in name else {"unit": "um"})
+        )
         assert found.spacing == (0.5, 0.5)
         assert_array_equal(np.isnan(found.heights), hidden)
         slopes = np.concatenate([s[np.isfinite(s)].ravel() for s in found.slopes()])
@@ -277,7 +279,9 @@ def test_measurement_standards(tmp_path):
 
 def test_a_field_of_metres_is_refused_with_both_readings(tmp_path):
     # A SUR or HGT file would do as well; this one is a map whose steps are metres
-    path = write(tmp_path, "# spacing_um = 2.5e6\n" + "0,1,0\n1,0,2\n0,1,1\n" * 22)
+    path = write(
+        tmp_path, "# spacing_um = 2.5e6\n# unit: um\n" + "0,1,0\n1,0,2\n0,1,1\n" * 22
+    )
     message = r"got 165 m with a pixel of 2.5 m; .*165 um"
     with pytest.raises(DataFileError, match=message):
         read_height_map(path)
@@ -298,7 +302,7 @@ def test_every_format_that_names_its_scale_is_judged_alike(tmp_path, factor):
         + "\n".join(" ".join(map(str, row)) for row in z) + "\n*\n",
         "b.csv": "x_um,y_um,z_um\n" + "\n".join(
             f"{i * step},{j * step},{z[j, i]}" for j in range(5) for i in range(6)),
-        "c.csv": f"# spacing_um = {step}\n" + "\n".join(
+        "c.csv": f"# spacing_um = {step}\n# unit: um\n" + "\n".join(
             ",".join(map(str, row)) for row in z),
     }  # fmt: skip
     for name, text in texts.items():

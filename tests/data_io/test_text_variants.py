@@ -102,7 +102,9 @@ def matrix(mark="nan", delimiter="\t"):
 )
 def test_maps_of_many_programs_are_the_same(tmp_path, text):
     path = write(tmp_path, text)
-    assert_allclose(read_height_map(path, spacing=1.0).heights, np.transpose(ROWS))
+    assert_allclose(
+        read_height_map(path, spacing=1.0, unit="um").heights, np.transpose(ROWS)
+    )
     assert not holds_profile(path)
 
 
