@@ -52,7 +52,8 @@ class Accessor:
         """Return the standard error of an element; None where the result holds no errors.
 
         Of DOLP and AOLP it takes the errors of M00, M10 and M20 as independent, which
-        overstates it.
+        overstates it; it is at most 1 and pi/2, and NaN where M00 is below two standard
+        errors.
         """
         return derived.element(self._dataset, name).stderr
 

@@ -58,7 +58,9 @@ def element(result: xr.Dataset, name: str, source: npt.ArrayLike = _LIGHT) -> El
     Notes
     -----
     The errors of the Stokes elements are taken as independent. Each path adds to M00 as it
-    adds to M10, so this overstates the error of a DOLP.
+    adds to M10, so this overstates the error of a DOLP. That is 1 and that of an AOLP
+    pi/2 at most, which is to know nothing; both are NaN where M00 is below two standard
+    errors.
     """
     if name not in NAMES:
         meant = f" Did you mean {name.upper()}?" if name.upper() in NAMES else ""
@@ -103,9 +105,12 @@ def _polarisation(result: xr.Dataset, name: str, source: npt.ArrayLike) -> Eleme
         # Along the polarisation; without any, along the worse of both axes
         along: Any = np.hypot(q * dq, u * du) / known
         along = along.fillna(np.maximum(dq, du))
-        error = np.hypot(along, value * di) / lit
+        error, most = np.hypot(along, value * di) / lit, 1.0
     else:
         error = (0.5 * np.hypot(u * dq, q * du) / known**2).where(value.notnull())
+        most = np.pi / 2
+    # Of light that is lost in its own error nothing is known; of other, no more than all
+    error = np.minimum(error, most).where(i >= 2.0 * di)
     return Element(_told(value, about), _told(error, about, True))
 
 

@@ -4,15 +4,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pbrdf.plots.panels import Panel
 from pbrdf.plots.sheet import halo
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Panel", "colour_bar", "draw_disc"]
+__all__ = ["colour_bar", "draw_disc"]
 
-# Name of the element, title, values and errors (theta_s, dphi)
-Panel = tuple[str, str, np.ndarray, np.ndarray | None]
 # Straight pieces that make a circle round
 _ROUND = 72
 # End of the colours of AOLP [deg]
@@ -21,7 +20,7 @@ _AOLP_END = 90.0
 
 def draw_disc(axis: Any, panel: Panel, look: Any, incidence: float) -> Any:
     """Draw one hemisphere, incidence in degrees; return what a colour bar explains."""
-    name, title, values, error = panel
+    name, title, values, error, _ = panel
     norm, colours, _ = look
     # Wide bins in pieces, so that rings are round
     pieces = -(-_ROUND // values.shape[1])
@@ -31,7 +30,8 @@ def draw_disc(axis: Any, panel: Panel, look: Any, incidence: float) -> Any:
     zenith = np.linspace(0.0, 90.0, n_theta + 1)
     # Bins are centred on dphi = 0, which is drawn to the left
     azimuth = (np.arange(n_dphi + 1) - pieces / 2) * 2 * np.pi / n_dphi + np.pi
-    axis.set_facecolor("0.85")
+    # The ends of the colours of AOLP are nearly the grey of the others
+    axis.set_facecolor("0.6" if name == "AOLP" else "0.85")
     axis.grid(visible=False)
     image = axis.pcolormesh(
         azimuth, zenith, np.ma.masked_invalid(values), norm=norm, cmap=colours,

@@ -16,8 +16,16 @@ DECADES = 4.0
 _TRUSTED = 0.2
 
 
-def reach_of(values: np.ndarray, stderr: np.ndarray | None) -> float:
+def reach_of(
+    values: np.ndarray, stderr: np.ndarray | None, bright: np.ndarray | None = None
+) -> float:
     """Return the largest magnitude that is known; one noisy cell does not set it.
+
+    Parameters
+    ----------
+    values, stderr : ndarray, one shape
+    bright : ndarray of bool, that shape, optional
+        Cells that carry the light: their values count whatever their errors.
 
     Examples
     --------
@@ -33,17 +41,29 @@ def reach_of(values: np.ndarray, stderr: np.ndarray | None) -> float:
     if stderr is None:
         return float(np.percentile(size[known], 99.5))
     sure = known & (stderr <= _TRUSTED * size)
+    counts = sure if bright is None else sure | (known & bright)
     if sure.any():
-        return float(size[sure].max())
-    lower = (size - 2 * stderr)[known & np.isfinite(stderr)]
-    best = float(lower.max()) if lower.size else 0.0
-    return best if best > 0 else float(np.percentile(size[known], 90))
+        return float(size[counts].max())
+    # Nothing is sure: what stands out, one cell in twenty left out, no less than errors
+    out = size[known & (size >= 2 * stderr)]
+    errors = stderr[known & np.isfinite(stderr)]
+    tops = [
+        float(np.percentile(out, 95)) if out.size else 0.0,
+        2.0 * float(np.median(errors)) if errors.size else 0.0,
+        float(size[counts].max()) if counts.any() else 0.0,
+    ]
+    return max(tops) or float(np.percentile(size[known], 90))
 
 
 def look_of(
-    name: str, values: np.ndarray, stderr: np.ndarray | None, scale: str = "auto"
+    name: str,
+    values: np.ndarray,
+    stderr: np.ndarray | None,
+    scale: str = "auto",
+    *,
+    bright: np.ndarray | None = None,
 ) -> "tuple[Normalize, str, dict[str, Any]]":
-    """Return norm, colour map and options of the colour bar for an element.
+    """Return norm, colour map and options of the colour bar; `bright` as of `reach_of`.
 
     Raises
     ------
@@ -57,7 +77,7 @@ def look_of(
         raise ValueError(msg)
     if name == "AOLP":
         return Normalize(-90.0, 90.0), "twilight", {"ticks": [-90, 0, 90]}
-    top = reach_of(values, stderr)
+    top = reach_of(values, stderr, bright)
     signed = name not in ("M00", "DOLP") and not name.startswith("error")
     size = np.abs(values[np.isfinite(values)])
     if scale == "auto":

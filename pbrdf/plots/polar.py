@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from pbrdf.derived.elements import Element, element, folded, mueller
+from pbrdf.derived.elements import folded, mueller
 from pbrdf.derived.places import choose, in_words
-from pbrdf.plots.disc import Panel, colour_bar, draw_disc
+from pbrdf.plots.disc import colour_bar, draw_disc
 from pbrdf.plots.limits import look_of
+from pbrdf.plots.panels import Panel, rows_of
 from pbrdf.plots.sheet import beam_of, lay_out, scene_of, small, title_of, width
 
 if TYPE_CHECKING:
@@ -42,7 +43,9 @@ def hemisphere(
     """Draw elements of a result over the hemisphere.
 
     Cells that are smaller than two standard errors are hatched; cells of which nothing is
-    known are grey. The largest value that is known to a fifth of itself sets the scale.
+    known are grey, as DOLP and AOLP are where M00 is below two standard errors. The largest
+    value sets the scale of those known to a fifth of themselves and those of the bins that
+    carry the light, a fifth or more of what the brightest one does.
 
     Parameters
     ----------
@@ -51,7 +54,7 @@ def hemisphere(
     elements : sequence of str
         M00 ... M33, DOLP, AOLP.
     errors : bool
-        Add a panel with the standard error of each.
+        Add a panel with the standard error of each, of a difference too.
     minus : str, optional
         Of a comparison: add rows of every other state minus this one, as "dry".
     scale : {"auto", "linear", "log", "symlog"}
@@ -89,7 +92,7 @@ def hemisphere(
         msg = f"a hemisphere must be chosen by {listed}."
         raise ValueError(msg)
     here, mirrored = folded(here) if fold else (here, False)
-    rows = _rows(here, elements, errors, minus)
+    rows = rows_of(here, elements, errors, minus)
     inches = width(width_mm)
     # No narrower than labels need
     fit = max(1, int(inches / _LEAST))
@@ -120,75 +123,6 @@ def hemisphere(
     return figure
 
 
-def _rows(
-    here: xr.Dataset, elements: Sequence[str], errors: bool, minus: Hashable | None
-) -> list[list[Panel]]:
-    """Panels (name, title, values, errors), row by row."""
-    found = {name: element(here, name) for name in elements}
-    if "state" not in mueller(here)[0].dims:
-        if minus is not None:
-            msg = f"minus must be left out of a result without states, got {minus!r}."
-            raise ValueError(msg)
-        rows = [[_panel(name, name, one) for name, one in found.items()]]
-        if errors:
-            rows.append([_error_panel(n, f"error of {n}", one) for n, one in found.items()])
-        return rows
-    states = [str(s) for s in here.state.values]
-    rows = []
-    for name, one in found.items():
-        parts = {s: _at(one, state=s) for s in states}
-        rows.append([_panel(name, f"{name}, {s}", p) for s, p in parts.items()])
-        if errors:
-            rows.append(
-                [_error_panel(name, f"error of {name}, {s}", p) for s, p in parts.items()]
-            )
-        if minus is not None:
-            if minus not in parts:
-                msg = f"minus must be one of {', '.join(states)}, got {minus!r}."
-                raise ValueError(msg)
-            base = parts[str(minus)]
-            rows.append(
-                [
-                    _panel("difference", f"{name}, {s} minus {minus}", _difference(p, base))
-                    for s, p in parts.items()
-                    if s != minus
-                ]
-            )
-    return rows
-
-
-def _at(one: Element, **place: Any) -> Element:
-    error = None if one.stderr is None else one.stderr.sel(place)
-    return Element(one.value.sel(place), error)
-
-
-def _difference(one: Element, base: Element) -> Element:
-    """Subtract; errors are taken as independent, which common surfaces make too large."""
-    error: Any = None
-    if one.stderr is not None and base.stderr is not None:
-        error = np.hypot(one.stderr, base.stderr)
-    return Element((one.value - base.value).assign_attrs(one.value.attrs), error)
-
-
-def _panel(name: str, title: str, one: Element) -> Panel:
-    value = one.value.transpose("theta_s", "dphi").values
-    error = None if one.stderr is None else one.stderr.transpose("theta_s", "dphi").values
-    if one.value.attrs.get("units") == "rad":
-        value = np.rad2deg(value)
-        error = None if error is None else np.rad2deg(error)
-    unit = {"sr-1": "1/sr", "rad": "deg"}.get(str(one.value.attrs["units"]), "1")
-    return name, f"{title} [{unit}]", value, error
-
-
-def _error_panel(name: str, title: str, one: Element) -> Panel:
-    if one.stderr is None:
-        msg = f"the result holds no errors of {name}. Leave errors out."
-        raise ValueError(msg)
-    _, heading, _, error = _panel(name, title, one)
-    assert error is not None
-    return f"error of {name}", heading, error, None
-
-
 def _drawn(here: xr.Dataset, rows: list[list[_Look]], inches: float) -> "Figure":
     from matplotlib.figure import Figure
 
@@ -200,13 +134,14 @@ def _drawn(here: xr.Dataset, rows: list[list[_Look]], inches: float) -> "Figure"
     incidence = float(np.rad2deg(here.theta_i))
     for number, row in enumerate(rows):
         # A difference stands below what it is of; the state that is taken off has none
-        offset = columns - len(row) if row[0][0][0] == "difference" else 0
+        apart = row[0][0].name.endswith("difference")
+        offset = columns - len(row) if apart else 0
         axes, images = [], []
-        for place, ((name, title, value, error), look) in enumerate(row):
+        for place, (panel, look) in enumerate(row):
             at = number * columns + place + offset + 1
             axis = figure.add_subplot(len(rows), columns, at, projection="polar")
-            words = title.replace(", ", ",\n") if len(title) > _LETTERS * side else title
-            images.append(draw_disc(axis, (name, words, value, error), look, incidence))
+            shown = panel._replace(title=_in_lines(panel.title, _LETTERS * side))
+            images.append(draw_disc(axis, shown, look, incidence))
             axes.append(axis)
         if _alike([panel for panel, _ in row]):
             colour_bar(figure, axes, images[0], row[0][1])
@@ -216,9 +151,17 @@ def _drawn(here: xr.Dataset, rows: list[list[_Look]], inches: float) -> "Figure"
     return figure
 
 
+def _in_lines(title: str, room: float) -> str:
+    """Break a title that is wider than its panel."""
+    if len(title) <= room:
+        return title
+    lines = title.replace(", ", ",\n").replace(" minus ", "\nminus ").split("\n")
+    return "\n".join(lines)
+
+
 def _alike(row: list[Panel]) -> bool:
     """Whether the panels of a row show one element, on one scale."""
-    return len(row) > 1 and len({name for name, *_ in row}) == 1
+    return len(row) > 1 and len({panel.name for panel in row}) == 1
 
 
 def _shared_looks(rows: list[list[Panel]], scale: str) -> list[list[Any]]:
@@ -226,10 +169,17 @@ def _shared_looks(rows: list[list[Panel]], scale: str) -> list[list[Any]]:
     looks = []
     for row in rows:
         if not _alike(row):
-            looks.append([look_of(n, v, e, scale) for n, _, v, e in row])
+            looks.append(
+                [look_of(p.name, p.value, p.error, scale, bright=p.bright) for p in row]
+            )
             continue
-        values = np.stack([v for _, _, v, _ in row])
-        kept = [e for *_, e in row if e is not None]
-        error = np.stack(kept) if len(kept) == len(row) else None
-        looks.append([look_of(row[0][0], values, error, scale)] * len(row))
+        values = np.stack([p.value for p in row])
+        error, bright = _stacked([p.error for p in row]), _stacked([p.bright for p in row])
+        look = look_of(row[0].name, values, error, scale, bright=bright)
+        looks.append([look] * len(row))
     return looks
+
+
+def _stacked(arrays: list[np.ndarray | None]) -> np.ndarray | None:
+    kept = [one for one in arrays if one is not None]
+    return np.stack(kept) if len(kept) == len(arrays) else None

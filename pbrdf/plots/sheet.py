@@ -19,8 +19,11 @@ __all__ = [
     "lay_out",
     "log_ticks",
     "new_figure",
+    "scene_of",
     "small",
+    "state_words",
     "title_of",
+    "width",
 ]
 
 # Colours that stay apart in print and for colour-blind eyes (Okabe and Ito)
@@ -115,6 +118,18 @@ def title_of(result: xr.Dataset, *, also: Mapping[str, str] | None = None) -> st
         parts += [] if "wavelength" in result.dims else ["wavelength not given"]
     parts += [f"{name} {value}" for name, value in (also or {}).items()]
     return ", ".join(parts)
+
+
+def state_words(result: xr.Dataset) -> dict[str, str]:
+    """Return what to call each state of a result: a number is a contact angle."""
+    states = [str(one) for one in result.state.values]
+    angles = result.get("contact_angle")
+    if angles is None or angles.dims != ("state",):
+        return dict(zip(states, states, strict=True))
+    return {
+        one: f"contact angle {np.rad2deg(angle):.4g} deg" if np.isfinite(angle) else one
+        for one, angle in zip(states, angles.values, strict=True)
+    }
 
 
 def beam_of(result: xr.Dataset) -> str:

@@ -64,6 +64,20 @@ def test_errors_follow_from_those_of_the_elements(ds):
     )
 
 
+def test_errors_of_polarisation_are_what_can_be_known(ds):
+    ds.brdf_total_stderr[0, 0, 1, 2] = 0.9
+    ds.brdf_total_stderr[0, 0, 1, 3] = 0.4
+    ds.brdf_total[0, 0, 1, 3, 1:3, 0] = 1e-9
+    here = ds.isel(theta_i=0, wavelength=0, theta_s=1)
+    for name, most in (("DOLP", 1.0), ("AOLP", np.pi / 2)):
+        error = here.pbrdf.stderr(name)
+        # M00 of 1.07 is below two errors of 0.9; with errors of 0.4 Q and U are unknown
+        assert np.isnan(error[2])
+        assert error.max() <= most
+        assert np.isfinite(error.isel(dphi=[0, 1, 3, 4, 5, 6, 7])).all()
+    assert_allclose(error[3], np.pi / 2)
+
+
 def test_nothing_known_is_nan(ds):
     ds.brdf_total[0, 0, 1, 2] = 0.0
     ds.brdf_total[0, 0, 1, 3] = np.nan

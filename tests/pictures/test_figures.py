@@ -60,6 +60,54 @@ def test_a_noisy_rim_cell_does_not_set_the_scale():
     assert reach_of(value, error) == 40.0
 
 
+def narrow_lobe() -> xr.Dataset:
+    """Return a lobe of four noisy bins on a base that is well known, and a rim cell."""
+    result = hand_made(n_theta=18, n_dphi=36).isel(wavelength=0, theta_i=0)
+    result.brdf_total[:] = 0.0
+    result.brdf_total[..., 0, 0] = 0.04
+    result.brdf_total[..., 1, 0] = 0.004
+    result.brdf_total_stderr[:] = 4e-4
+    result.brdf_total[3:5, 17:19, 0, 0] = 0.9
+    result.brdf_total[3:5, 17:19, 1, 0] = 0.8
+    result.brdf_total_stderr[3:5, 17:19] = 0.3
+    result.brdf_total[17, 2, :2, 0] = 5.0
+    result.brdf_total_stderr[17, 2] = 4.9
+    return result
+
+
+def test_a_narrow_lobe_sets_the_scale_and_a_rim_cell_does_not():
+    figure = hemisphere(narrow_lobe(), ("M00", "M10", "DOLP"))
+    tops = [
+        axis.collections[0].get_clim()[1] for axis in figure.axes if axis.name == "polar"
+    ]
+    assert_allclose(tops, [0.9, 0.8, 0.8 / 0.9], rtol=1e-6)
+    # The rim cell is lost in its own error: its polarisation is not known
+    dolp = [axis for axis in figure.axes if axis.name == "polar"][2].collections[0]
+    unknown = dolp.get_array().mask
+    assert np.unique(np.argwhere(unknown)[:, 0]).tolist() == [17]
+    assert unknown.sum() == unknown.shape[1] / 36
+
+
+def test_a_difference_has_errors_and_no_scale_below_them():
+    one = hand_made().isel(wavelength=0, theta_i=0)
+    one.brdf_total_stderr[:] = 0.3
+    states = xr.concat(
+        [one, one * 1.0], xr.DataArray(["dry", "30 deg"], dims="state", name="state"),
+        data_vars="all",
+    ).assign_coords(contact_angle=("state", [np.nan, np.deg2rad(30)]))  # fmt: skip
+    states.brdf_total[1] = 1.01 * states.brdf_total[0]
+    figure = hemisphere(states, ("M00",), minus="dry", errors=True, width_mm=170.0)
+    polar = {a.get_title(): a for a in figure.axes if a.name == "polar"}
+    words = [title.replace("\n", " ") for title in polar]
+    assert words[-2:] == [
+        "M00, contact angle 30 deg minus dry [1/sr]",
+        "error of M00, contact angle 30 deg minus dry [1/sr]",
+    ]
+    difference, error = (a.collections[0] for a in list(polar.values())[-2:])
+    assert_allclose(np.unique(error.get_array()), np.hypot(0.3, 0.3))
+    assert difference.get_clim()[1] >= 2 * 0.3 * np.sqrt(2) - 1e-9
+
+
 def test_uncertain_cells_are_hatched_and_unknown_ones_left_out():
     result = hand_made().isel(wavelength=0, theta_i=0)
     result.brdf_total_stderr[3, 5, 0, 0] = 9.0
