@@ -1,6 +1,8 @@
 """`ds.pbrdf`: what one wants of a result, by one method.
 
-Registered by importing this module, and whenever the package returns or reads a result.
+`import pbrdf` alone registers nothing, so as not to load xarray. What registers it: every
+function of the package that returns or reads a result (`data_io.read_result`), and, for
+results that `xarray.open_dataset` opens, `import pbrdf.accessor`.
 """
 
 from collections.abc import Sequence

@@ -2,13 +2,16 @@
 
 import re
 import shlex
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+import data_io
 from pbrdf.cli import main
 from tests.fits.test_pipeline import FEW, write_scan
+from tests.pictures.results import hand_made
 
 ROOT = Path(__file__).parents[2]
 
@@ -47,6 +50,16 @@ def test_commands_of_the_site_work_as_pasted(tmp_path, monkeypatch, capsys):
 @pytest.mark.slow
 def test_code_of_the_quick_start_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (code,) = blocks("quick_start.md", "python")
+    code = blocks("quick_start.md", "python")[0]
     exec(compile(code, "quick_start.md", "exec"), {})
     assert "pbrdf" in sys.modules
+
+
+def test_a_stored_result_opens_in_a_new_notebook_as_told(tmp_path):
+    data_io.write_result(hand_made(), tmp_path / "paint.nc")
+    _, code = blocks("quick_start.md", "python")
+    told = (ROOT / "docs/quick_start.md").read_text(encoding="utf-8")
+    (line,) = re.findall(r"`(import pbrdf\.\w+)`", told)
+    other = f"{line}, xarray as xr; xr.open_dataset('paint.nc').pbrdf.dolp()"
+    for text in (code, other, "import pbrdf, sys; assert 'xarray' not in sys.modules"):
+        subprocess.run([sys.executable, "-c", text], cwd=tmp_path, check=True, timeout=60)
