@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fitting.checks.unread import what_is_not_read
+from fitting.checks.unread import what_hangs_together, what_is_not_read
 from fitting.models.cuts import plane_curves
 from fitting.models.simulated import SimulatedModel
 from fitting.prediction.beside_gaussian import MeasuredSlopes, measured_slopes
@@ -191,6 +191,7 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
         unknown=(
             *what_is_not_read(measurement, statistics),
             *_beyond_optics(measurement, statistics),
+            *what_hangs_together(monte_carlo),
             *analytic.warnings,
         ),
         measured_slopes=own,

@@ -8,9 +8,14 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
+    from fitting.result.fit_result import FitResult
     from fitting.statistics.result import SurfaceStatistics
 
-__all__ = ["what_is_not_read"]
+__all__ = ["what_hangs_together", "what_is_not_read"]
+
+# Correlations, and shares of a variance, that a reader is told of
+_TOGETHER = 0.8
+_SHARE = 0.1
 
 
 def what_is_not_read(
@@ -38,3 +43,32 @@ def what_is_not_read(
         yield "One incidence was measured; others are predictions."
     if not np.isfinite(statistics.slope_rms.stderr):
         yield "The surface does not determine the slope; it was fitted to the scan instead."
+
+
+def what_hangs_together(fit: "FitResult") -> Iterator[str]:
+    """Name parameters that stand and fall together, and errors that the scan did not make.
+
+    Correlations from 0.8 on; sources, other than the noise of the readings, of a tenth or
+    more of a parameter's variance.
+    """
+    names = list(fit.values)
+    for i, j in zip(*np.triu_indices(len(names), 1), strict=True):
+        together = float(fit.correlation[i, j])
+        pair = f"{names[j]} and {names[i]} are", f"{names[i]} and {names[j]} are"
+        warned = any(words in warning for words in pair for warning in fit.warnings)
+        if abs(together) >= _TOGETHER and not warned:
+            way = "the other is too high" if together > 0 else "the other is too low"
+            yield (
+                f"{names[i]} and {names[j]} are correlated at {together:.2f}: where one is "
+                f"too high, {way}."
+            )
+    for name, parts in fit.stderr_parts.items():
+        whole = float(sum(part**2 for part in parts.values()))
+        for source, part in parts.items():
+            if source != "noise" and np.isfinite(whole) and part**2 > _SHARE * whole:
+                yield (
+                    f"The standard error of {name} is {fit.stderr[name]:.2g}, of which "
+                    f"{part:.2g} come from the uncertain {source} and "
+                    f"{parts.get('noise', 0.0):.2g} from the noise of the readings, added "
+                    "in squares."
+                )

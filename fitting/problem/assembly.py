@@ -163,7 +163,8 @@ def labelled(measurement: Any) -> dict[str, "xr.Dataset"]:
     elif isinstance(measurement, Sequence):
         scans = {str(index): scan for index, scan in enumerate(measurement)}
     else:
-        scans = {"0": measurement}
+        # The file that a reader notes
+        scans = {str(getattr(measurement, "attrs", {}).get("source") or "0"): measurement}
     if not scans:
         msg = "measurement must hold at least one scan, got none."
         raise ValueError(msg)

@@ -1,8 +1,9 @@
 """A page that explains any result: summary, hemisphere, fits, glossary, origin, data."""
 
 import json
+import re
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from html import escape
 from typing import Any
@@ -31,29 +32,39 @@ __all__ = [
     "sections_of",
 ]
 
+# Symbol, unit, meaning, and what occurs in a page that uses it
 _GLOSSARY = (
-    ("M00 ... M33", "1/sr", "Mueller BRDF: scattered radiance over irradiance"),
+    ("M00 ... M33", "1/sr", "Mueller BRDF: scattered radiance over irradiance", "M00"),
     ("M10, M20", "1/sr", "polarised parts of what unpolarised light makes: s over "
-     "p, and at 45 degrees"),
-    ("DOLP", "1", "degree of linear polarisation, √(M10² + M20²) / M00"),
-    ("AOLP", "deg", "angle of polarisation from the direction s towards p"),
-    ("theta_i, theta_s", "deg", "zenith angles of source and detector"),
-    ("dphi", "deg", "azimuth from source to detector: 180 specular, 0 back to the source"),
-    ("view angle", "deg", "zenith of the detector in the plane, positive forward"),
-    ("slope_rms", "1", "rms slope of the surface along one axis"),
-    ("height_rms, corr_length", "um", "rms height; lag where its correlation is 1/e"),
-    ("specular_gain", "1", "factor on the surface reflection"),
-    ("diffuse_albedo", "1", "Lambertian part: adds diffuse_albedo / π to M00"),
-    ("n, kappa", "1", "refractive index n + i kappa"),
-    ("standard error, ±", "", "one standard deviation of the estimate"),
-    ("chi2 / dof", "1", "mean square of the residuals in standard errors; 1 is expected"),
-    ("misfit", "", f"verdict on the curve. {RULE}"),
+     "p, and at 45 degrees", "M10|M20"),
+    ("DOLP", "1", "degree of linear polarisation, √(M10² + M20²) / M00", "DOLP"),
+    ("AOLP", "deg", "angle of polarisation from the direction s towards p", "AOLP"),
+    ("theta_i, theta_s", "deg", "zenith angles of source and detector", "theta_i|theta_s"),
+    ("dphi", "deg", "azimuth from source to detector: 180 specular, 0 back to the source",
+     "dphi"),
+    ("view angle", "deg", "zenith of the detector in the plane, positive forward",
+     "view"),
+    ("slope_rms", "1", "rms slope of the surface along one axis", "slope_rms"),
+    ("height_rms, corr_length", "um", "rms height; lag where its correlation is 1/e",
+     "height_rms|corr_length"),
+    ("specular_gain", "1", "factor on the surface reflection", "specular_gain"),
+    ("diffuse_albedo", "1", "Lambertian part: adds diffuse_albedo / π to M00",
+     "diffuse_albedo"),
+    ("n, kappa", "1", "refractive index n + i kappa", "kappa|index"),
+    ("standard error, ±", "", "one standard deviation of the estimate",
+     "[Ss]tandard error|±"),
+    ("chi2 / dof", "1", "mean square of the residuals in standard errors; 1 is expected",
+     "chi2"),
+    ("misfit", "", f"verdict on the curve. {RULE}", "misfit|verdict"),
 )  # fmt: skip
+# What is not read: scripts, and tags with all that they hold
+_CODE = re.compile(r"<script>.*?</script>|<[^>]*>", re.DOTALL)
 
 
 def page_of(result: xr.Dataset, name: str) -> str:
     """Return the whole page of a result that `read_result` gave."""
-    return html.page(f"Report: {name}", sections_of(result, name))
+    sections = list(sections_of(result, name))
+    return html.page(f"Report: {name}", [*sections, glossary(sections)])
 
 
 def sections_of(result: xr.Dataset, name: str) -> Iterator[str]:
@@ -85,7 +96,6 @@ def sections_of(result: xr.Dataset, name: str) -> Iterator[str]:
     if notes:
         yield html.section("Warnings", html.bullets(map(str, notes)))
     yield origin(result.attrs.get("made_by"), result)
-    yield glossary()
 
 
 def fit_summary(fits: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -136,14 +146,12 @@ def facts(result: xr.Dataset, name: str) -> str:
     rows = [
         ("sample", name),
         ("report written", f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"),
-        ("scene", scene_of(result) or result.attrs.get("source", "not recorded")),
+        ("scene", scene_of(result) or result.attrs.get("source") or _scene_file(result)),
     ]
     if "theta_i" in result.coords:
         angles = np.rad2deg(np.unique(result.theta_i.values))
         rows.append(("incidence [deg]", ", ".join(f"{a:.4g}" for a in angles)))
-    waves = np.array([])
-    if "wavelength" in result.coords:
-        waves = np.atleast_1d(result.wavelength.values)
+    waves = np.atleast_1d(result.coords.get("wavelength", []))
     listed = ", ".join(f"{w:.6g}" for w in waves)
     rows.append(("wavelength [um]", listed or "not given"))
     rows.append(("program", f"pbrdf {result.attrs.get('version', __version__)}"))
@@ -159,9 +167,19 @@ def correlations(names: list[str], matrix: Any) -> str:
     return html.table(("correlation", *names), rows)
 
 
-def glossary() -> str:
-    """Return a section with every symbol."""
-    return html.section("Glossary", html.table(("symbol", "unit", "meaning"), _GLOSSARY))
+def glossary(sections: Sequence[str]) -> str:
+    """Return a section with every symbol that these sections use."""
+    used = _CODE.sub("", " ".join(sections))
+    rows = [row for *row, sign in _GLOSSARY if re.search(sign, used)]
+    return html.section("Glossary", html.table(("symbol", "unit", "meaning"), rows))
+
+
+def _scene_file(result: xr.Dataset) -> str:
+    """Name the file of the scene among the inputs, where the scene itself is not held."""
+    record = result.attrs.get("made_by")
+    inputs = record.get("inputs", ()) if isinstance(record, Mapping) else ()
+    names = [str(one["name"]) for one in inputs if one.get("role") == "scene"]
+    return f"that of {', '.join(names)}, see below" if names else "not recorded"
 
 
 def origin(record: Any, result: xr.Dataset | None = None) -> str:
@@ -211,9 +229,14 @@ def _how_sure(result: xr.Dataset) -> str:
     lit = (one.value > 0.1 * float(one.value.max())).values
     part = 100 * one.stderr.values[lit] / one.value.values[lit]
     return (
-        f"Above a tenth of its peak M00 is known to {np.nanmedian(part):.2g} % in "
-        f"the median bin and {np.nanmax(part):.2g} % in the worst (one standard error)."
+        f"Above a tenth of its peak M00 is known to {_percent(np.nanmedian(part))} in "
+        f"the median bin and {_percent(np.nanmax(part))} in the worst (one standard error)."
     )
+
+
+def _percent(part: float) -> str:
+    """Return a percentage without a power of ten."""
+    return f"{part:.2g} %" if part < 99.5 else f"{part:.0f} %"
 
 
 def _estimate(one: Mapping[str, Any]) -> str:

@@ -18,6 +18,7 @@ __all__ = [
     "png",
     "section",
     "table",
+    "told",
 ]
 
 # Of figures that are embedded [dots an inch], and how wide an inch is shown [px]: letters
@@ -29,7 +30,11 @@ _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
        padding: 0 1rem; color: #222; overflow-wrap: anywhere; }
 h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
-.wide { overflow-x: auto; }
+.wide { overflow-x: auto; overflow-wrap: normal; }
+.wide.more { border-right: 3px solid #D55E00; }
+.wide.more::before { content: "↔ scroll sideways for the rest"; display: block;
+       position: sticky; left: 0; width: max-content; color: #8a3d00; font-size: 15px; }
+.long { overflow-wrap: anywhere; min-width: 16rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid #ddd;
          min-width: 4rem; vertical-align: top; }
@@ -42,16 +47,26 @@ pre { font-size: 14px; white-space: pre-wrap; background: #f4f4f4; padding: .6re
 select, button { font: inherit; max-width: 100%; }
 #value { font-weight: 600; min-height: 3em; }
 @media print {
+  .wide.more { border: 0; } .wide.more::before { content: none; }
   body { max-width: none; margin: 0; } .controls, button { display: none; }
   img { max-width: 100%; height: auto; }
   h2 { break-after: avoid; } table, figure, .viewer { break-inside: avoid; }
 }
 """
 
+# Tables and figures that are wider than the screen say so
+_CUE = (
+    'const cue = () => document.querySelectorAll(".wide").forEach((e) => '
+    'e.classList.toggle("more", e.scrollWidth > e.clientWidth + 1)); '
+    'addEventListener("load", cue); addEventListener("resize", cue);'
+)
+# Longer words, hashes among them, may break
+_LONG = 30
+
 
 def page(title: str, sections: Iterable[str]) -> str:
     """Return a whole HTML page."""
-    body = "\n".join(sections)
+    body = "\n".join([*sections, f"<script>{_CUE}</script>"])
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -75,17 +90,26 @@ def bullets(texts: Iterable[str]) -> str:
     return "<ul>" + "".join(f"<li>{escape(text)}</li>" for text in texts) + "</ul>"
 
 
+def told(texts: Iterable[str]) -> str:
+    """Return a list of plain texts, or that there is nothing to say."""
+    listed = list(texts)
+    return bullets(listed) if listed else paragraph("Nothing that this fit can see.")
+
+
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table of plain texts."""
     head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
-    body = "\n".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
-        for row in rows
-    )
+    body = "\n".join("<tr>" + "".join(map(_cell, row)) + "</tr>" for row in rows)
     return (
-        f'<div class="wide"><table><thead><tr>{head}</tr></thead>\n'
+        f'<div class="wide" tabindex="0"><table><thead><tr>{head}</tr></thead>\n'
         f"<tbody>{body}</tbody></table></div>"
     )
+
+
+def _cell(text: str) -> str:
+    """Return a cell; only words too long for any screen may break in it."""
+    long = any(len(word) > _LONG for word in text.split())
+    return f"<td{' class=long' if long else ''}>{escape(text)}</td>"
 
 
 def png(drawing: "Figure") -> bytes:
@@ -101,8 +125,8 @@ def figure(image: bytes, caption: str) -> str:
     # Bytes 16 to 19 of a PNG are its width
     width = int.from_bytes(image[16:20]) * _INCH // _DPI
     return (
-        f'<figure><div class="wide"><img alt="{escape(caption)}" style="width:{width}px" '
-        f'src="data:image/png;base64,{data}"></div>'
+        f'<figure><div class="wide" tabindex="0"><img alt="{escape(caption)}" '
+        f'style="width:{width}px" src="data:image/png;base64,{data}"></div>'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import data_io
+from fitting.checks.unread import what_hangs_together, what_is_not_read
 from fitting.report import explorer, html
 from fitting.report.fit_files import calibrated
 from fitting.report.surface import edge_figure, surface_figure
@@ -42,7 +43,8 @@ def write_quick(
         "made_by": dict(record),
     }
     data_io.write_model(fit.model, folder / "model.toml", notes=notes)
-    page = html.page("First look", _sections(result, figures, record))
+    sections = list(_sections(result, figures, record))
+    page = html.page("First look", [*sections, explorer.glossary(sections)])
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -54,7 +56,7 @@ def _sections(
         "Summary",
         html.paragraph(
             f"The analytical curve follows the scan with the verdict "
-            f"“{fit.misfit.verdict}”: {fit.misfit}. Nothing was simulated: light of "
+            f"“{fit.misfit.verdict}”: {fit.misfit.size}. Nothing was simulated: light of "
             "several bounces is missing; the gains make up for it. The command without "
             "--quick says how much that matters."
         ),
@@ -65,7 +67,6 @@ def _sections(
         html.paragraph(f"Verdicts: {RULE}."),
         html.figure(figures["scan.png"], "Scan and analytical curve; below, residuals."),
         explorer.correlations(list(fit.values), fit.correlation),
-        html.bullets(fit.warnings),
     )
     edge = figures.get("edge.png")
     yield html.section(
@@ -78,5 +79,15 @@ def _sections(
         "" if edge is None else html.figure(edge, "The edge as it was read."),
         html.figure(figures["surface.png"], "The surface and its statistics."),
     )
+    yield html.section("What these data cannot tell", html.told(_unknown(result)))
     yield explorer.origin(record)
-    yield explorer.glossary()
+
+
+def _unknown(result: "QuickResult") -> tuple[str, ...]:
+    """Name what these data cannot tell."""
+    fit = result.analytic
+    return (
+        *what_is_not_read(result.measurement, result.statistics),
+        *what_hangs_together(fit),
+        *fit.warnings,
+    )

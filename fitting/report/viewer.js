@@ -4,7 +4,7 @@
   const data = JSON.parse(document.getElementById("hemisphere-data").textContent);
   const byId = (name) => document.getElementById(name);
   const disc = byId("disc"), cut = byId("cut"), bar = byId("scale"), said = byId("value");
-  const nT = data.n_theta, nP = data.n_dphi, DECADES = 4, FONT = "13px system-ui, sans-serif";
+  const nT = data.n_theta, nP = data.n_dphi, DECADES = 4, RIM = 40, FONT = "13px system-ui, sans-serif";
   const dims = data.dims.map((_, k) => "dim" + k);
   const pick = {};
   ["element", ...dims, "bounces", "show", "scale"].forEach((n) => { pick[n] = byId("pick-" + n); });
@@ -72,12 +72,20 @@
     const size = Math.abs(v), short = size === 0 || (size >= 1e-3 && size < 1e5);
     return short ? String(Number(v.toPrecision(3))) : v.toExponential(2);
   };
-  const log = () => pick.scale.value === "log";
+  const wide = (layer) => {                      // as the plots choose: decades are spanned
+    if (layer.wide === undefined) {
+      const lit = Array.from(layer.value, Math.abs).filter((v) => v > 0 && Number.isFinite(v)).sort((a, b) => a - b);
+      layer.wide = layer.kind !== "angle" && layer.unit === "1/sr" && lit.length > 0 &&
+        layer.top > 30 * (lit[(lit.length - 1) >> 1] + lit[lit.length >> 1]) / 2;
+    }
+    return layer.wide;
+  };
+  const log = (layer) => pick.scale.value === "log" || (pick.scale.value === "auto" && wide(layer));
 
   const share = (v, layer) => {                  // 0 ... 1 on the colour scale
     if (layer.kind === "angle") return (v + 90) / 180;
     const signed = layer.kind === "signed";
-    if (log()) {
+    if (log(layer)) {
       const size = Math.min(1, Math.max(0, 1 + Math.log10(Math.abs(v) / layer.top) / DECADES));
       return signed ? 0.5 + 0.5 * Math.sign(v) * size : v > 0 ? size : 0;
     }
@@ -109,7 +117,7 @@
   };
 
   function drawDisc(layer) {
-    size = room(420); radius = size / 2 - 28;
+    size = room(420); radius = size / 2 - RIM;
     const g = prepared(disc, size, size), fine = disc.width / size;
     const image = g.createImageData(disc.width, disc.height);
     for (let j = 0; j < disc.height; j++) for (let i = 0; i < disc.width; i++) {
@@ -130,7 +138,7 @@
     letters(g, "30°", middle + radius / 3 * 0.4, middle - radius / 3 * 0.92);
     letters(g, "60°", middle + 2 * radius / 3 * 0.4, middle - 2 * radius / 3 * 0.92);
     letters(g, "★", middle - zenith, middle); letters(g, "+", middle + zenith, middle);
-    letters(g, "0°", 12, middle); letters(g, "180°", size - 16, middle);
+    letters(g, "0°", 12, middle); letters(g, "180°", size - 18, middle);
     letters(g, "270°", middle, 12); letters(g, "90°", middle, size - 12);
     if (mark) {
       const r = (mark.t + 0.5) / nT * radius, a = mark.p * 2 * Math.PI / nP - Math.PI;
@@ -144,15 +152,15 @@
       g.fillStyle = "rgb(" + mapped(i / span, layer.kind).join() + ")"; g.fillRect(left + i, 2, 1.5, 14);
     }
     const top = layer.kind === "angle" ? 90 : layer.top, least = top / 10 ** DECADES;
-    const marks = layer.kind === "rising" ? (log() ? [least, top / 100, top] : [0, top / 2, top])
-      : log() && layer.kind === "signed" ? [-top, "±" + shown(least), top] : [-top, 0, top];
+    const marks = layer.kind === "rising" ? (log(layer) ? [least, top / 100, top] : [0, top / 2, top])
+      : log(layer) && layer.kind === "signed" ? [-top, "±" + shown(least), top] : [-top, 0, top];
     g.fillStyle = "#222"; g.textBaseline = "top";
     marks.forEach((v, k) => {
       g.textAlign = ["left", "center", "right"][k];
       g.fillText(typeof v === "string" ? v : shown(v), [2, width / 2, width - 2][k], 20);
     });
   }
-  const left = 66, low = 34;
+  const left = 66, low = 52;
   const cutPoints = () => {
     const points = [];
     for (let t = nT - 1; t >= 0; t--) points.push([-(t + 0.5) * 90 / nT, t * nP, t, 0]);
@@ -161,16 +169,22 @@
   };
   const cutX = (a, w) => left + (a + 90) / 180 * (w - left - 14);
   function drawCut(layer) {
-    const w = room(520), h = 320, g = prepared(cut, w, h), points = cutPoints();
+    const w = room(520), h = 340, g = prepared(cut, w, h), points = cutPoints();
     const curve = data.model && pick.show.value === "Monte Carlo" ? modelled(place()) : null;
     const scan = pick.show.value === "Monte Carlo" && (!pick.bounces || pick.bounces.value === "0")
       ? data.readings[place()][element().name] || [] : [];
-    const logarithmic = log() && layer.kind === "rising";
+    const logarithmic = log(layer) && layer.kind === "rising";
     const all = points.flatMap((p) => [layer.value[p[1]], curve ? curve.value[p[1]] : NaN]).concat(scan.map((r) => r[1]))
       .filter((v) => Number.isFinite(v) && (!logarithmic || v > 0));
     const angle = layer.kind === "angle";
     let top = angle ? 90 : all.length ? Math.max(...all) : 1;
     let base = angle ? -90 : all.length ? Math.min(0, ...all) : 0;
+    // Room for the bars, as far as they are no longer than the curve is high
+    const bars = angle || !layer.error ? [] : points.map((p) => [layer.value[p[1]], 2 * layer.error[p[1]]])
+      .concat(scan.map((r) => [r[1], 2 * (r[2] || 0)])).filter((b) => b.every(Number.isFinite));
+    const tall = top - base;
+    if (bars.length) top = Math.max(top, Math.min(top + tall, Math.max(...bars.map((b) => b[0] + b[1]))));
+    if (base < 0 && bars.length) base = Math.min(base, Math.max(base - tall, Math.min(...bars.map((b) => b[0] - b[1]))));
     if (logarithmic) base = Math.max(top / 1e5, Math.min(...all, top) / 2);
     if (!(top > base)) top = base + 1;
     const part = (v) => (logarithmic ? Math.log(Math.max(v, base) / base) / Math.log(top * 1.3 / base) : (v - base) / ((top - base) * 1.08));
@@ -186,6 +200,7 @@
     }
     g.textAlign = "center";
     [-90, -45, 0, 45, 90].forEach((a) => g.fillText(a + "°", Math.min(X(a), w - 16), h - low + 14));
+    g.fillText("view angle [deg], + forward", (left + w - 14) / 2, h - 12);
     if (curve) {
       g.strokeStyle = "#D55E00"; g.setLineDash([6, 4]); g.lineWidth = 1.5; g.beginPath();
       points.forEach((p) => { const v = curve.value[p[1]]; if (Number.isFinite(v) && (!logarithmic || v > 0)) g.lineTo(X(p[0]), Y(v)); });

@@ -99,7 +99,8 @@ def _page(held: dict[str, Any], notes: list[str]) -> str:
     text = json.dumps(held, allow_nan=False).replace("<", "\\u003c")
     script = (files("fitting.report") / "viewer.js").read_text(encoding="utf-8")
     scales = (
-        '<option value="linear">linear</option><option value="log">logarithmic</option>'
+        '<option value="auto">automatic</option><option value="linear">linear</option>'
+        '<option value="log">logarithmic</option>'
     )
     controls = "".join(
         f'<label>{escape(words)} <select id="pick-{name}">{options}</select></label> '
@@ -118,11 +119,23 @@ def _page(held: dict[str, Any], notes: list[str]) -> str:
         '<p><button type="button" id="download">Download what is shown (CSV)</button></p>\n'
         '<p class="note">★ source, + specular direction; forward to the right, seen from '
         "above. Striped: below two standard errors; grey: not known. The cut is in the "
-        "plane of incidence, forward positive, with bars of two standard errors; dashed: "
-        "the analytical model; diamonds: the scan.</p>\n"
+        "plane of incidence, forward positive, with bars of two standard errors, cut off "
+        f"at the frame where they are longer than the curve is high.{_drawn(held)}</p>\n"
         f'{note}\n<script type="application/json" id="hemisphere-data">{text}</script>\n'
         f"<script>{script}</script>"
     )
+
+
+def _drawn(held: dict[str, Any]) -> str:
+    """Say what else a picture holds."""
+    words = []
+    if held["model"] is not None:
+        words.append("Dashed: the analytical model.")
+    if any(held["readings"]):
+        words.append("Diamonds: the scan.")
+    if any(d["name"] == "state" and "dry" in d["values"] for d in held["dims"]):
+        words.append("Choose a wet state, and at Show “minus dry”, for what water changes.")
+    return "".join(f" {one}" for one in words)
 
 
 def _controls(held: dict[str, Any], scales: str) -> Iterator[tuple[str, str, str]]:

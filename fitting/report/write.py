@@ -75,7 +75,7 @@ def write_report(
         *_sections(result, together, figures, inputs or {}, times),
         explorer.origin(record),
     ]
-    page = html.page("Reflectance model", [*sections, explorer.glossary()])
+    page = html.page("Reflectance model", [*sections, explorer.glossary(sections)])
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -220,7 +220,7 @@ def _sections(
         hemisphere_view(_layers(result, together)),
         *download_links(result, _notes(result, None)),
     )
-    yield html.section("What these data cannot tell", html.bullets(result.unknown))
+    yield html.section("What these data cannot tell", html.told(result.unknown))
     yield html.section(
         "Simulation",
         html.table(
@@ -265,7 +265,7 @@ def _model_section(fits: "dict[str, FitResult]", scan: bytes) -> str:
             ("misfit", *fits),
             [
                 ("verdict", *(fit.misfit.verdict for fit in fits.values())),
-                ("size of the misfit", *(str(fit.misfit) for fit in fits.values())),
+                ("size of the misfit", *(fit.misfit.size for fit in fits.values())),
                 ("chi2 / dof", *(_quality(fit) for fit in fits.values())),
                 ("noise of the scan", *(fit.noise for fit in fits.values())),
                 *_misfit_rows(fits),

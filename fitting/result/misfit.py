@@ -89,7 +89,8 @@ class Reading:
         if not across:
             where = f"view {-np.sign(np.cos(self.dphi)) * theta_s + 0.0:.4g} deg"
         wave = f", {self.wavelength:.6g} um" if np.isfinite(self.wavelength) else ""
-        return f"{self.observable} of {self.scan}{wave} at theta_i {theta_i:.4g}, {where}"
+        scan = f"scan {self.scan}" if self.scan.isdigit() else self.scan
+        return f"{self.observable} of {scan}{wave} at theta_i {theta_i:.4g}, {where}"
 
     @property
     def size(self) -> str:
@@ -143,8 +144,13 @@ class Misfit:
     groups: "tuple[tuple[str, float, Misfit], ...]" = ()
 
     def __str__(self) -> str:
+        return f"{self.verdict}: {self.size}"
+
+    @property
+    def size(self) -> str:
+        """How far the readings lie from the curve, in words, without the verdict."""
         return (
-            f"{self.verdict}: half of the readings are off by more than "
+            f"half of the readings are off by more than "
             f"{100.0 * self.median:.2g} %, the worst by {self.worst.size} "
             f"({self.worst.place}: {self.worst.measured:.4g} measured, "
             f"{self.worst.model:.4g} fitted); {self.rms_stderr:.2g} standard errors rms, "

@@ -57,11 +57,13 @@ def asked(page: str, ask: list[Any], folder: Path) -> dict[int, dict[str, Any]]:
 
 
 def assert_sound(found: dict[int, dict[str, Any]]) -> None:
-    """No console error, letters of 12 px at least, nothing runs off, images are there."""
+    """No console error, letters of 12 px at least, whole words, cues, images are there."""
     for width, out in found.items():
         assert out["errors"] == [], width
         assert out["small"] == [], width
         assert out["wide"] == [], width
+        assert out["broken"] == [], width
+        assert out["uncued"] == [], width
         # An inch of a figure holds 200 dots, its smallest letters are 7 pt
         for natural, shown in out["images"]:
             assert natural, width

@@ -6,11 +6,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
+from fitting.report import html
 from fitting.report.explorer import page_of
 from fitting.report.layers import model_of
 from pbrdf.derived import element
 from pbrdf.derived.bins import on_bins
+from pbrdf.plots.limits import look_of
 from tests.pictures.browser import WIDTHS, asked, assert_sound
 from tests.pictures.results import hand_made
 
@@ -63,7 +66,9 @@ def found(tmp_path_factory):
 def test_the_page_is_sound_on_a_desk_and_in_a_hand(found):
     _, answers = found
     assert_sound(answers)
-    assert all(answers[width]["lettered"] > 20 for width in WIDTHS)
+    for width in WIDTHS:
+        assert len(answers[width]["lettered"]) > 20
+        assert "view angle [deg], + forward" in answers[width]["lettered"]
 
 
 def number(text: str) -> list[float]:
@@ -107,3 +112,45 @@ def test_each_control_changes_the_picture(found):
         assert names == [
             f"pick-{n}" for n in ("element", "dim0", "dim1", "bounces", "show", "scale")
         ]
+
+
+def test_numbers_stay_whole_and_what_scrolls_says_so(tmp_path):
+    rows = [
+        ("diffuse_albedo_of_the_base", "0.078655", "not determined", "-1.4999", "1e-27")
+    ]
+    header = ("quantity", "standard error", "value", "95 % from", "to")
+    figure = html.figure(html.png(Figure(figsize=(6, 1))), "wide")
+    page = html.page("Page", [html.table(header, rows * 3), figure])
+    viewer = '<canvas id="disc"></canvas><p id="value"></p>'
+    answers = asked(page.replace("</body>", f"{viewer}</body>"), [], tmp_path)
+    assert_sound(answers)
+    assert answers[390]["scrolling"] == 2
+    assert answers[1440]["scrolling"] == 0
+
+
+def test_the_page_opens_on_the_scale_that_the_plot_chooses(tmp_path):
+    flat, peaked = bounced(), bounced()
+    peaked["brdf_total"] = peaked.brdf_total.copy()
+    peaked.brdf_total[:, :, 3, 4] *= 3000.0
+    for number, (result, scale) in enumerate([(flat, "linear"), (peaked, "log")]):
+        value = element(result.isel(theta_i=0, wavelength=0), "M00").value.values
+        norm = type(look_of("M00", value, None)[0]).__name__
+        assert norm == {"linear": "Normalize", "log": "LogNorm"}[scale]
+        word = {"linear": "linear", "log": "logarithmic"}
+        other = word["log" if scale == "linear" else "linear"]
+        first = {"element": "M00 [1/sr]"}
+        asks = [(p, 2, 3, *BINS) for p in (first, {"scale": word[scale]}, {"scale": other})]
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        for out in asked(page_of(result, "r.nc"), asks, folder).values():
+            opened, same, differs = (disc for _, disc, _ in out["answers"])
+            assert opened == same != differs
+
+
+def test_the_cut_has_room_for_its_bars(tmp_path):
+    result = bounced()
+    result["brdf_total_stderr"] = xr.full_like(result.brdf_total, 0.25)
+    for answer in asked(page_of(result, "r.nc"), [], tmp_path).values():
+        cut = result.brdf_total[0, 0, :, [0, 4], 0, 0]
+        ends = float(cut.max()) + 2 * 0.25
+        assert f"{ends:.3g}" in answer["lettered"]

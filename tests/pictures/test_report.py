@@ -3,13 +3,21 @@
 import base64
 import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 from numpy.testing import assert_allclose
+from scipy.ndimage import gaussian_filter1d
 
-from data_io import write_result
+from data_io import Profile, read_goniometer, write_result
+from fitting.checks.unread import what_hangs_together
+from fitting.quick import run_quick
+from fitting.report import html
 from fitting.report.explorer import fit_summary, origin, page_of
+from fitting.report.quick_page import write_quick
+from pbrdf import Material
 from pbrdf.cli import main
+from tests.fits.test_pipeline import write_scan
 from tests.pictures.results import hand_made
 
 
@@ -83,3 +91,61 @@ def test_the_origin_names_hashes_and_command():
     text = origin(record)
     assert "ab" * 32 in text
     assert "pbrdf pipeline &#x27;my scan.csv&#x27; --n 1.5" in text
+
+
+def test_what_hangs_together_and_whose_error_it_is():
+    fit = SimpleNamespace(
+        values={"specular_gain": 0.8, "diffuse_albedo": 0.1, "n": 1.5},
+        correlation=np.array([[1, -0.9512, 0.1], [-0.9512, 1, np.nan], [0.1, np.nan, 1]]),
+        stderr={"specular_gain": 0.05, "diffuse_albedo": 0.01, "n": 0.02},
+        stderr_parts={
+            "specular_gain": {"noise": 0.03, "slope_rms": 0.04},
+            "diffuse_albedo": {"noise": 0.00999, "slope_rms": 0.0005}, "n": {"noise": 0.02},
+        },
+        warnings=(),
+    )  # fmt: skip
+    together, error = what_hangs_together(fit)
+    assert "specular_gain and diffuse_albedo are correlated at -0.95" in together
+    assert "the other is too low" in together
+    assert "error of specular_gain is 0.05, of which 0.04 come from" in error
+    assert "slope_rms and 0.03 from the noise" in error
+    fit.warnings = ("diffuse_albedo and specular_gain are 95 % correlated; fix one",)
+    assert list(what_hangs_together(fit)) == [error]
+
+
+def test_a_first_look_says_what_it_cannot_tell_and_names_the_scan(tmp_path):
+    write_scan(tmp_path / "steel.csv", ("M00",))
+    x = np.arange(400.0)
+    z = gaussian_filter1d(np.random.default_rng(1).standard_normal(400), 6.0) * 8
+    result = run_quick(
+        Profile(x, z), read_goniometer(tmp_path / "steel.csv"), material=Material(1.5)
+    )
+    record = {"program": "p", "command": "pipeline", "options": {}, "inputs": []}
+    write_quick(result, tmp_path, record=record)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    listed = re.search(r"What these data cannot tell</h2>\s*<ul>(.*?)</ul>", page, re.S)[1]
+    assert "Only unpolarised reflectance" in listed
+    assert "come from the uncertain slope_rms" in listed
+    assert "(M00 of steel.csv" in page
+    verdict = result.analytic.misfit.verdict
+    assert f"“{verdict}”: half of the readings" in page
+    assert "Nothing that this fit can see" in html.told(())
+
+
+def test_the_page_of_a_simulation_explains_only_what_it_shows():
+    result = hand_made()
+    result.attrs["made_by"] = {
+        "program": "p", "command": "dew", "options": {},
+        "inputs": [{"role": "scene", "name": "wet.toml", "sha256": "ab" * 32}],
+    }  # fmt: skip
+    result.brdf_total_stderr[:] = 1.0
+    page = page_of(result, "r.nc")
+    explained = page.partition("Glossary")[2]
+    assert "DOLP" in explained
+    for word in ("chi2", "specular_gain", "diffuse_albedo", "misfit", "kappa"):
+        assert word not in explained
+    assert "that of wet.toml, see below" in page
+    assert "not recorded" not in page
+    assert re.search(r"in the median bin and \d+ % in the worst", page)
+    fitted = page_of(result.assign_attrs(monte_carlo_fit=fit("good", 0.8)), "r.nc")
+    assert "factor on the surface reflection" in fitted
