@@ -203,10 +203,12 @@ def read_store(
     *,
     wavelength: float | None = None,
     theta_i: float | None = None,
+    interpolated: bool = True,
 ) -> "xr.Dataset":
     """Interpolate the store of a sweep at NAME=VALUE of each thing that varied.
 
-    Values are in the units of the store's names; those of text are taken as text.
+    Values are in the units of the store's names; those of text are taken as text. Errors
+    hold that of interpolation if `interpolated`.
 
     Raises
     ------
@@ -222,4 +224,4 @@ def read_store(
             msg = "--wavelength-um must be given once, got it in --at too. Leave one out."
             raise ValueError(msg)
         wavelength = places.pop("wavelength")
-    return from_store(path).at(theta_i, wavelength, **places)
+    return from_store(path).at(theta_i, wavelength, interpolated=interpolated, **places)

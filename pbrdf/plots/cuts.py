@@ -9,7 +9,7 @@ import xarray as xr
 from pbrdf.derived.elements import element, mueller
 from pbrdf.derived.places import choose, in_words
 from pbrdf.derived.plane import in_plane
-from pbrdf.plots.sheet import COLOURS, beam_of, new_figure, scene_of, small, width
+from pbrdf.plots.sheet import COLOURS, beam_of, new_figure, point_of, scene_of, small, width
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -96,7 +96,7 @@ def plane_cuts(
             if name in here.coords and here[name].ndim == 0
         ]
         note = "plane of incidence, + forward; bands: 2 standard errors"
-        lines = [", ".join(chosen), scene_of(here), beam_of(here), note]
+        lines = [", ".join(chosen), point_of(here), scene_of(here), beam_of(here), note]
         figure.suptitle("\n".join(line for line in lines if line))
     return figure
 

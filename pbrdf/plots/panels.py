@@ -95,8 +95,9 @@ def _bright(here: xr.Dataset) -> xr.DataArray:
     """Return where the hemisphere of a state sends most of its light, beyond its error."""
     m00 = element(here, "M00")
     flux = m00.value * np.sin(2.0 * m00.value.theta_s)
-    bright = flux >= _CARRIES * flux.max(("theta_s", "dphi"))
-    return bright if m00.stderr is None else bright & (m00.value >= 2.0 * m00.stderr)
+    if m00.stderr is not None:
+        flux = flux.where(m00.value >= 2.0 * m00.stderr, 0.0)
+    return (flux > 0.0) & (flux >= _CARRIES * flux.max(("theta_s", "dphi")))
 
 
 def _known(name: str, one: Element) -> Element:

@@ -11,7 +11,7 @@ from pbrdf.derived.places import choose, in_words
 from pbrdf.plots.disc import colour_bar, draw_disc
 from pbrdf.plots.limits import look_of
 from pbrdf.plots.panels import Panel, rows_of
-from pbrdf.plots.sheet import beam_of, lay_out, scene_of, small, title_of, width
+from pbrdf.plots.sheet import beam_of, lay_out, point_of, scene_of, small, title_of, width
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -111,6 +111,7 @@ def hemisphere(
             line
             for line in (
                 title_of(here) + (", folded about the plane" if mirrored else ""),
+                point_of(here),
                 scene_of(here),
                 beam_of(here).replace(" (dotted)", ""),
                 note if inches > 4.5 else note.replace("   hatched", "\nhatched"),

@@ -1,6 +1,5 @@
 """The sheet of a figure: its width, its letters, its colours, what stands in its title."""
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +18,7 @@ __all__ = [
     "lay_out",
     "log_ticks",
     "new_figure",
+    "point_of",
     "scene_of",
     "small",
     "state_words",
@@ -31,6 +31,11 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 # One and two columns of a journal [mm]
 WIDTHS = (85.0, 170.0)
 MM = 1 / 25.4
+# Coordinates that have words of their own in a title, or are the picture's
+_NAMED = (
+    "theta_i", "phi_i", "wavelength", "state", "contact_angle", "theta_s", "dphi",
+    "theta_view", "bounces", "stokes_out", "stokes_in",
+)  # fmt: skip
 # Letters at the size that is printed [pt]
 SIZE = 7.5
 
@@ -107,8 +112,8 @@ def halo(colour: str = "white", linewidth: float = 1.8) -> list[Any]:
     return [patheffects.withStroke(linewidth=linewidth, foreground=colour)]
 
 
-def title_of(result: xr.Dataset, *, also: Mapping[str, str] | None = None) -> str:
-    """Name incidence, wavelength, further places and the scene of one hemisphere."""
+def title_of(result: xr.Dataset) -> str:
+    """Name incidence, wavelength and azimuth of the source of one hemisphere."""
     parts = []
     if "theta_i" in result.coords and result.theta_i.ndim == 0:
         parts.append(f"incidence {np.rad2deg(float(result.theta_i)):.4g}°")
@@ -116,7 +121,8 @@ def title_of(result: xr.Dataset, *, also: Mapping[str, str] | None = None) -> st
         parts.append(f"{float(result.wavelength):.4g} µm")
     else:
         parts += [] if "wavelength" in result.dims else ["wavelength not given"]
-    parts += [f"{name} {value}" for name, value in (also or {}).items()]
+    if "phi_i" in result.coords and result.phi_i.ndim == 0:
+        parts.append(f"azimuth of the source {np.rad2deg(float(result.phi_i)):.4g}°")
     return ", ".join(parts)
 
 
@@ -130,6 +136,24 @@ def state_words(result: xr.Dataset) -> dict[str, str]:
         one: f"contact angle {np.rad2deg(angle):.4g} deg" if np.isfinite(angle) else one
         for one, angle in zip(states, angles.values, strict=True)
     }
+
+
+def point_of(result: xr.Dataset) -> str:
+    """Name the point of a sweep that a result is of, empty where it is of none."""
+    told = str(result.attrs.get("interpolated_at", "")).replace("=", " = ")
+    parts = [told] if told else []
+    for name, one in result.coords.items():
+        if one.ndim or name in _NAMED:
+            continue
+        value = one.values.item()
+        text = f"{value:.6g}" if isinstance(value, float) else str(value)
+        parts.append(f"{name} = {text}")
+    along = result.attrs.get("interpolated_along", "")
+    words = ", ".join(parts)
+    if not along:
+        return words
+    bare = result.attrs.get("stderr_excludes_interpolation", False)
+    return f"{words} (interpolated along {along}{', its error apart' if bare else ''})"
 
 
 def beam_of(result: xr.Dataset) -> str:

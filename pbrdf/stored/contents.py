@@ -73,6 +73,33 @@ class Contents:
             values.setdefault(name, known.nodes[0])
         return values
 
+    def between(self, theta_i: np.ndarray, values: Mapping[str, Any]) -> tuple[str, ...]:
+        """Return the axes along which some value is none of those computed.
+
+        Parameters
+        ----------
+        theta_i : ndarray
+            Incidences. [rad]
+        values : mapping
+            As of `named`: each parameter, all of one shape or numbers.
+        """
+        nodes = {n: p.nodes for n, p in self.parameters.items() if p.number}
+        nodes["theta_i"] = self.dataset.theta_i.to_numpy()
+        apart: tuple[str, ...] = ()
+        if self.cloud is not None:
+            names = self.cloud.names
+            nodes = {name: axis for name, axis in nodes.items() if name not in names}
+            rows = np.stack(
+                np.broadcast_arrays(*(np.asarray(values[n], float) for n in names)), -1
+            ).reshape(-1, 1, len(names))
+            near = np.isclose(rows, self.cloud.points, rtol=1e-9, atol=1e-12)
+            apart = () if near.all(-1).any(-1).all() else names
+        for name, axis in nodes.items():
+            value = np.asarray(theta_i if name == "theta_i" else values[name], float)
+            near = np.isclose(value.reshape(-1, 1), axis, rtol=1e-9, atol=1e-9)
+            apart = apart if near.any(-1).all() else (*apart, name)
+        return apart
+
     def read(
         self, place: Mapping[str, np.ndarray], incidences: list[int] | None = None
     ) -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 import warnings
 from collections import OrderedDict
+from collections.abc import Iterable
 from functools import cached_property
 from typing import Any
 
@@ -43,6 +44,15 @@ class Interpolation:
         self._contents = contents
         self._theta_i = contents.dataset.theta_i.to_numpy()
         self._points: OrderedDict[tuple[Any, ...], Point] = OrderedDict()
+        # What to say of axes, once, when something is interpolated along them
+        self._doubts: dict[str, str] = {}
+
+    def warn(self, names: Iterable[str]) -> None:
+        """Say of axes that are interpolated along where the error of it is a guess."""
+        for name in names:
+            doubt = self._doubts.pop(name, None)
+            if doubt is not None:
+                warnings.warn(doubt, AccuracyWarning, stacklevel=4)
 
     def point(self, place: dict[str, Any]) -> Point:
         """Return the interpolated point, one of those in memory if it is there."""
@@ -139,51 +149,49 @@ class Interpolation:
                     array.reshape(len(one.nodes), *array.shape[len(middle) :])
                     for array in self._contents.read(line)
                 )
-                found[name] = _measure(name, one.nodes, value, stderr)
-                _warn_if_coarse(name, found[name])
+                found[name] = _measure(one.nodes, value, stderr)
         value, stderr = (
             array.reshape(array.shape[len(middle) :])
             for array in self._contents.read(middle)
         )
         nodes = self._theta_i
         if len(nodes) == 2:
-            found["theta_i"] = _of_two("theta_i", value)
+            found["theta_i"] = _of_two(value)
         elif len(nodes) > 2:
             found["theta_i"] = best(
                 nodes, lambda scheme: incidence_trial(self._lobes(value, stderr, scheme))
             )
-            _warn_if_coarse("theta_i", found["theta_i"])
+        doubts = {name: _doubt(name, one) for name, one in found.items()}
+        self._doubts = {name: doubt for name, doubt in doubts.items() if doubt}
         return found
 
 
-def _measure(
-    name: str, nodes: np.ndarray, value: np.ndarray, stderr: np.ndarray
-) -> Measured:
+def _measure(nodes: np.ndarray, value: np.ndarray, stderr: np.ndarray) -> Measured:
     if len(nodes) == 2:
-        return _of_two(name, value)
+        return _of_two(value)
     return best(nodes, lambda scheme: parameter_trial(scheme, nodes, value, stderr))
 
 
-def _warn_if_coarse(name: str, measured: Measured) -> None:
-    """Say where values lie so far apart that left-out ones tell nothing of the gaps."""
-    worst = float(measured.at_nodes[0, 0, 0])
-    if worst > COARSE:
-        msg = (
-            f"the store's values of {name} must lie closer: one of them left out is missed "
-            f"by {100 * worst:.2g} % of M00 where it is bright, which says little of the "
-            "gaps. Errors between them are guesses. Compute more values by a sweep."
-        )
-        warnings.warn(msg, AccuracyWarning, stacklevel=2)
-
-
-def _of_two(name: str, value: np.ndarray) -> Measured:
-    """Return what is known between two nodes, and say that it is not much."""
+def _of_two(value: np.ndarray) -> Measured:
+    """Return what is known between two nodes, none of which can be left out."""
     between = midway(value[0], value[1], 0.5)
-    worst = 100 * between[:2, 0, 0].max()
-    msg = (
-        f"the store has two values of {name}, none to leave out: half their difference, up "
-        f"to {worst:.2g} % of M00 where it is bright, stands for the error between them. "
-        "Compute a third by a sweep."
-    )
-    warnings.warn(msg, AccuracyWarning, stacklevel=2)
     return Measured(SCHEMES["linear in ln M00"], np.full_like(between, np.nan), between)
+
+
+def _doubt(name: str, measured: Measured) -> str:
+    """Tell where values left out tell nothing of the gaps, empty where they do."""
+    worst = float(measured.at_nodes[0, 0, 0])
+    if np.isnan(measured.at_nodes).all():
+        worst = 100 * measured.between[:2, 0, 0].max()
+        return (
+            f"the store has two values of {name}, none to leave out: half their "
+            f"difference, up to {worst:.2g} % of M00 where it is bright, stands for the "
+            "error between them. Compute a third by a sweep."
+        )
+    if not worst > COARSE:
+        return ""
+    return (
+        f"the store's values of {name} must lie closer: one of them left out is missed "
+        f"by {100 * worst:.2g} % of M00 where it is bright, which says little of the "
+        "gaps. Errors between them are guesses. Compute more values by a sweep."
+    )

@@ -176,3 +176,13 @@ def parameter_trial(
         return found, value[left], np.hypot(spread, stderr[left])
 
     return trial
+
+
+def error_of_albedo(
+    noise: np.ndarray, between: np.ndarray, weight: np.ndarray
+) -> np.ndarray:
+    """Error of the sum over the hemisphere (..., theta_s, dphi) of errors of M00."""
+    independent = np.sum((noise * weight) ** 2, axis=(-2, -1))
+    alike = np.sum(between * weight, axis=(-2, -1))
+    found: np.ndarray = np.sqrt(independent + alike**2)
+    return found

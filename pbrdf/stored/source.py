@@ -10,7 +10,7 @@ from pbrdf.conventions import RESULT_VARIABLES, STOKES
 from pbrdf.errors import require
 from pbrdf.stored.contents import Contents
 from pbrdf.stored.interpolation import Interpolation
-from pbrdf.stored.left_out import CLASSES
+from pbrdf.stored.left_out import CLASSES, error_of_albedo
 from pbrdf.stored.scattered import ScatteredInterpolation
 
 if TYPE_CHECKING:
@@ -67,6 +67,7 @@ class StoredBRDF:
         """
         dims = ("axis", "brightness", "stokes_out", "stokes_in")
         measured = list(self._between.measured.values())
+        self._between.warn(self._between.measured)
         about = {"units": "1"}
         return xr.Dataset(
             {
@@ -99,7 +100,7 @@ class StoredBRDF:
         Warns
         -----
         AccuracyWarning
-            If an axis has two values only, so that the error between them is a guess.
+            If it lies between the two values of an axis: the error there is a guess.
         """
         at = (theta_i, theta_s, dphi)
         return self._evaluated(at, wavelength, parameters, error=False)[0]
@@ -165,7 +166,8 @@ class StoredBRDF:
         Dataset
             brdf_total, its standard error, and albedo_stderr: that of the sum over the
             hemisphere if errors of interpolation are alike everywhere and those of the
-            simulation independent.
+            simulation independent. The attribute `interpolated_along` names the axes whose
+            values were not computed.
         """
         data = self._contents.dataset
         incidences = np.atleast_1d(self._theta_i if theta_i is None else theta_i)
@@ -200,12 +202,16 @@ class StoredBRDF:
             variable.attrs = {"units": entry.units, "long_name": entry.long_name}
         weight = data.projected_solid_angle.load()
         out["projected_solid_angle"] = (weight.dims, weight.to_numpy(), dict(weight.attrs))
-        total = _of_albedo(noise[..., 0, 0], between[..., 0, 0], weight.to_numpy())
+        total = error_of_albedo(noise[..., 0, 0], between[..., 0, 0], weight.to_numpy())
         about = {"units": "1", "long_name": RESULT_VARIABLES["albedo_stderr"].long_name}
         of = ("theta_i", "wavelength") if waves is not None else ("theta_i",)
         out["albedo_stderr"] = (of, total if waves is not None else total[:, 0], about)
         told = ", ".join(f"{name}={value}" for name, value in parameters.items())
         out.attrs = {"store": self._contents.path.name, "interpolated_at": told}
+        place = parameters if waves is None else parameters | {"wavelength": each}
+        along = self._contents.between(incidences, self._contents.named(place))
+        out.attrs["interpolated_along"] = ", ".join(along)
+        out.attrs["stderr_excludes_interpolation"] = not interpolated
         return out
 
     def plot(
@@ -258,6 +264,7 @@ class StoredBRDF:
                     between[rows] = point.between(
                         theta_i[rows], theta_s[rows], dphi[rows], value[rows, 0, 0]
                     )
+        self._between.warn(self._contents.between(theta_i, named))
         whole = (*shape, 4, 4)
         return value.reshape(whole), stderr.reshape(whole), between.reshape(whole)
 
@@ -289,11 +296,3 @@ class StoredBRDF:
                 "lie in [-12.57, 12.57] rad", cure,
             ),
         ]  # fmt: skip
-
-
-def _of_albedo(noise: np.ndarray, between: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Error of the sum over the hemisphere (..., theta_s, dphi) of errors of M00."""
-    independent = np.sum((noise * weight) ** 2, axis=(-2, -1))
-    alike = np.sum(between * weight, axis=(-2, -1))
-    found: np.ndarray = np.sqrt(independent + alike**2)
-    return found

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.testing import assert_allclose
 
 import pbrdf
 from pbrdf.errors import DataFileError
+from pbrdf.plots import hemisphere
 from pbrdf.stored import read_sweep
 from pbrdf.sweeps import load_sweep, run_sweep
 from tests.stored.conftest import SCENE, SWEEP
@@ -208,6 +210,11 @@ def test_degrees_and_names_of_the_file_are_understood(tmp_path: Path) -> None:
     source = pbrdf.from_store(tmp_path / "s.zarr")
     assert source.ranges["material"] == ("pvc", "bk7")
     theta_i = np.deg2rad(30.0)
+    with warnings.catch_warnings():
+        # Nothing is interpolated
+        warnings.simplefilter("error")
+        node = source.at(material="bk7", corr_length=6.0)
+    assert node.attrs["interpolated_along"] == ""
     with pytest.warns(pbrdf.AccuracyWarning, match="two values of corr_length"):
         one = source.brdf(theta_i, 0.5, np.pi, material="bk7", corr_length=5.0)
     assert_allclose(
@@ -215,6 +222,10 @@ def test_degrees_and_names_of_the_file_are_understood(tmp_path: Path) -> None:
     )
     with pytest.raises(ValueError, match="wavelength"):
         source.brdf(theta_i, 0.5, np.pi, 0.6, material="bk7", corr_length=5.0)
+    between = source.at(material="bk7", corr_length_um=5.0)
+    assert between.attrs["interpolated_along"] == "corr_length"
+    figure = hemisphere(between, ("M00",), fold=False)
+    assert "corr_length_um = 5.0 (interpolated along corr_length)" in figure.get_suptitle()
     other = source.brdf(theta_i, 0.5, np.pi, material="bk7", corr_length_um=5.0)
     assert_allclose(one, other, rtol=1e-14)
     assert (source.error(theta_i, 0.5, np.pi, material="bk7", corr_length=5.0)[0, 0]) > 0

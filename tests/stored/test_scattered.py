@@ -123,6 +123,10 @@ def test_at_its_points_it_returns_what_was_computed(store: Path) -> None:
     found = source.brdf(np.deg2rad(40.0), theta_s, dphi, **there)
     peak = float(point.brdf_total[..., 0, 0].max())
     assert_allclose(found, point.brdf_total, rtol=1e-6, atol=1e-6 * peak)
+    here = source.at(np.deg2rad(40.0), **there, interpolated=False)
+    assert here.attrs["interpolated_along"] == ""
+    moved = source.at(np.deg2rad(40.0), **there | {"n": 1.55}, interpolated=False)
+    assert set(moved.attrs["interpolated_along"].split(", ")) == {"n", "slope_rms"}
 
 
 def test_between_its_points_the_error_holds_a_simulation(store: Path) -> None:

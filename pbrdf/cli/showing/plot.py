@@ -144,7 +144,10 @@ def _of_store(
     from pbrdf.plots import hemisphere, plane_cuts
 
     incidence = None if theta_i is None else math.radians(theta_i)
-    here = read_store(source, at, wavelength=wavelength, theta_i=incidence)
+    # A band shows the error of interpolation; as a mask it would hide what noise does not
+    here = read_store(
+        source, at, wavelength=wavelength, theta_i=incidence, interpolated=plane
+    )
     if plane:
         return plane_cuts(here, elements, **look)
     first = {
