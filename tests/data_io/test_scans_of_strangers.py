@@ -53,7 +53,7 @@ def test_words_for_gaps_are_counted(tmp_path):
         f"\ufeff\ufeff{HEAD}30,10,0.05\n\ufeff{HEAD}30,20,0.06\n30.5,30,0.07\n",
         "sep=;\ntheta_i_deg;theta_view_deg;M00\n30;10;0,05\n30;20;0,06\n30,5;30;0,07\n",
         'theta_i_deg,theta_view_deg,M00\n"30","10","0,05"\n"30","20","0,06"\n"30,5","30","0,07"\n',
-        "theta_i,theta_view,M00\n30°,10°,5%\n30°,20°,6 %\n30.5°,30°,7%\n",
+        "theta_i,theta_view,M00\n30°,10°,.05\n30 °,20°,.06\n30.5°,30°,.07\n",
         "theta_i;theta_view;M00\n[º];[º];[sr⁻¹]\n30;10;.05\n30;20;.06\n30.5;30;.07\n",
         "theta_i_deg,theta_view_deg,M00,M00\n30,10,0.05,0.05\n30,20,0.06,0.06\n30.5,30,0.07,0.07\n",
         ",theta_i_deg,theta_view_deg,M00\n0,30,10,0.05\n1,30,20,0.06\n2,30.5,30,0.07\n",

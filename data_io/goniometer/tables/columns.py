@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +14,18 @@ from data_io.goniometer.tables.names import (
     ANGLES,
     IGNORE,
     Meaning,
-    bare_name,
     meaning_of,
     target_of,
 )
 from data_io.goniometer.tables.table import RawTable
 from data_io.goniometer.tables.text_columns import say_left_out
+from data_io.goniometer.tables.unit_words import (
+    declared_name,
+    honoured,
+    require_agreement,
+    require_stderr_unit,
+)
+from data_io.goniometer.tables.units import bare_name
 from data_io.goniometer.tables.unknown import COLUMNS_CURE, unknown_columns
 from pbrdf.errors import DataFileError
 from pbrdf.optics.published.columns import Column
@@ -45,6 +51,8 @@ class Columns:
         Line of each row.
     left_out : str
         Names of columns of text.
+    per_cent : mapping of str to str
+        Values that the file writes in per cent, and what it calls them.
     """
 
     angles: Mapping[str, np.ndarray]
@@ -53,6 +61,7 @@ class Columns:
     names: Mapping[str, str]
     lines: list[int]
     left_out: str = ""
+    per_cent: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_columns(path: Path, table: RawTable, declared: Declared) -> Columns:
@@ -68,10 +77,11 @@ def read_columns(path: Path, table: RawTable, declared: Declared) -> Columns:
     ConventionWarning
         If a column of text is left out, a word marks a gap, or a column stands twice.
     """
-    meanings, text = _meanings(path, table, declared)
+    meanings, keys, text = _meanings(path, table, declared)
     angles: dict[str, pd.Series] = {}
     values: dict[str, dict[float | None, pd.Series]] = {}
     names: dict[str, str] = {}
+    per_cent: dict[str, str] = {}
     first: dict[tuple[str, float | None], int] = {}
     waves = None
     read = [k for k, meaning in enumerate(meanings) if meaning.name != IGNORE]
@@ -86,34 +96,39 @@ def read_columns(path: Path, table: RawTable, declared: Declared) -> Columns:
             _require_same(path, table, first[key, meaning.wavelength], k, key)
             continue
         first[key, meaning.wavelength] = k
-        names[key] = bare_name(table.names[k])
+        names[key] = keys[k]
         if key == "wavelength":
             waves = numbers / 1e3 if meaning.unit == "nm" else _to_um(numbers, meaning)
         elif key in ANGLES:
             angles[key] = numbers if meaning.unit == "deg" else np.degrees(numbers)
         else:
             scaled = numbers / 100.0 if meaning.unit == "%" else numbers
+            if meaning.unit == "%":
+                per_cent[key] = keys[k]
             values.setdefault(key, {})[meaning.wavelength] = scaled
     _require_full(path, table, angles, waves, names)
     long = _long(path, table, angles, values, waves, names)
-    return replace(long, left_out=", ".join(text))
+    return replace(long, left_out=", ".join(text), per_cent=per_cent)
 
 
 def _meanings(
     path: Path, table: RawTable, declared: Declared
-) -> tuple[list[Meaning], list[str]]:
-    """Return what each column holds, and those of text; refuse what nobody knows."""
+) -> tuple[list[Meaning], list[str], list[str]]:
+    """Return what each column holds, what to call it, and those of text.
+
+    Refuse what nobody knows.
+    """
     _check_mapping(path, table, declared)
     found: list[Meaning] = []
+    keys: list[str] = []
     unknown, without_unit, text = [], [], []
-    for k, (raw, name) in enumerate(zip(table.bare_names, table.names, strict=True)):
-        if raw in declared.columns:
-            meaning = target_of(declared.columns[raw])
-        else:
-            meaning = meaning_of(name)
-            if meaning is None and table.is_text(k):
-                text.append(name)
-                meaning = Meaning(IGNORE)
+    for k, name in enumerate(table.names):
+        key = declared_name(name, declared.columns)
+        keys.append(bare_name(name) if key is None else key)
+        meaning = _meaning(path, table, k, key, declared)
+        if meaning is None and table.is_text(k):
+            text.append(name)
+            meaning = Meaning(IGNORE)
         if meaning is None:
             unknown.append(name)
         elif meaning.name in ANGLES and (declared.angles or meaning.unit is None):
@@ -123,10 +138,24 @@ def _meanings(
         found.append(meaning or Meaning(IGNORE))
     if unknown or without_unit:
         raise unknown_columns(path, table, unknown, without_unit)
-    _require_one_unit(path, table, found)
+    require_stderr_unit(path, table, found, keys)
     if text:
         say_left_out(path, table, text)
-    return found, text
+    return found, keys, text
+
+
+def _meaning(
+    path: Path, table: RawTable, column: int, key: str | None, declared: Declared
+) -> Meaning | None:
+    """Return what a column holds, by its mapping or its name, in one unit."""
+    name = table.names[column]
+    if key is not None:
+        return honoured(path, table, name, key, declared)
+    meaning = meaning_of(name)
+    if meaning is not None or not table.is_text(column):
+        known = meaning or meaning_of(bare_name(name))
+        require_agreement(path, table, name, known, declared.angles)
+    return meaning
 
 
 def _say_gaps(path: Path, table: RawTable, column: int) -> None:
@@ -155,31 +184,15 @@ def _require_same(path: Path, table: RawTable, one: int, other: int, key: str) -
     raise DataFileError(path, problem, cure, line=table.header, column=second)
 
 
-def _require_one_unit(path: Path, table: RawTable, meanings: list[Meaning]) -> None:
-    """Refuse a standard error in per cent of what is not, or the other way round."""
-    units = {(m.name, m.wavelength): m.unit for m in meanings if not m.stderr}
-    for name, meaning in zip(table.names, meanings, strict=True):
-        key = meaning.name, meaning.wavelength
-        if not meaning.stderr or "%" not in (meaning.unit, units.get(key)):
-            continue
-        if key in units and units[key] != meaning.unit:
-            problem = f"expected a standard error in the unit of {meaning.name}"
-            cure = (
-                "A part of each reading is no unit: write the error itself, or leave the "
-                f"column out (--columns {bare_name(name)}=ignore) and let the fit "
-                "estimate the noise."
-            )
-            raise DataFileError(path, problem, cure, line=table.header, column=name)
-
-
 def _check_mapping(path: Path, table: RawTable, declared: Declared) -> None:
     """Refuse a mapping of columns that are not there, or to what nobody knows."""
-    absent = [name for name in declared.columns if name not in table.bare_names]
+    known = {declared_name(name, declared.columns) for name in table.names}
+    absent = [name for name in declared.columns if name not in known]
     if absent:
         problem = (
             f"expected the columns {', '.join(map(repr, absent))} to rename, found none"
         )
-        cure = f"The file has {', '.join(table.bare_names)}."
+        cure = f"The file has {', '.join(map(bare_name, table.names))}."
         raise DataFileError(path, problem, cure, line=table.header)
     wrong = [to for to in declared.columns.values() if target_of(to) is None]
     if wrong:

@@ -4,10 +4,11 @@ import re
 from dataclasses import dataclass
 
 from data_io.goniometer.scan import QUANTITIES, STDERR
+from data_io.goniometer.tables.units import ANGLE_UNITS
 from pbrdf.optics.published.columns import column_of, unit_of
 
 __all__ = [
-    "ANGLES", "IGNORE", "TARGETS", "Meaning", "bare_name", "meaning_of", "target_of",
+    "ANGLES", "IGNORE", "TARGETS", "Meaning", "meaning_of", "target_of",
 ]  # fmt: skip
 
 # What a column may hold beside the quantities; sample_rotation turns the sample
@@ -47,9 +48,7 @@ TARGETS = (
     IGNORE,
 )  # fmt: skip
 
-_ANGLE_UNITS = {"deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "º": "deg",
-                "rad": "rad",
-                "radian": "rad", "radians": "rad", "grad": None}  # fmt: skip
+_ANGLE_UNITS = {**ANGLE_UNITS, "grad": None}
 _GREEK = {"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "δ": "delta "}
 _IN_BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$")
 _DIVIDED = re.compile(r"^[Mm](\d\d)\s*/\s*[Mm]00$|^[Mm](\d\d)_norm(?:alised|alized)?$")
@@ -86,9 +85,10 @@ class Meaning:
 def target_of(name: str) -> Meaning | None:
     """Return the meaning of one of `TARGETS`, as the user writes it behind the sign =."""
     if name not in TARGETS:
-        # M00_450nm: what a column headed 450 holds
+        # M00_450nm: what a column headed 450 holds; wavelength_angstrom, energy_ev
         found = meaning_of(name)
-        return found if found is not None and found.wavelength is not None else None
+        spectral = found is not None and found.name == "wavelength" and found.unit
+        return found if found is not None and (spectral or found.wavelength) else None
     return Meaning(IGNORE) if name == IGNORE else meaning_of(name)
 
 
@@ -107,6 +107,12 @@ def meaning_of(name: str) -> Meaning | None:
     ('m10', True)
     """
     plain, bracket = _split(name)
+    if _AT_WAVELENGTH.fullmatch(bracket):
+        # BRDF (450 nm)
+        plain, bracket = f"{plain} {bracket}", ""
+    elif at := _IN_BRACKETS.match(plain):
+        # BRDF (450 nm) [1/sr]
+        plain = f"{at[1]} {at[2]}" if _AT_WAVELENGTH.fullmatch(at[2]) else plain
     found = _angle(plain, bracket)
     if found:
         return found
@@ -125,17 +131,6 @@ def meaning_of(name: str) -> Meaning | None:
         if what:
             return Meaning(what.name, what.unit, what.stderr, wavelength)
     return None
-
-
-def bare_name(name: str) -> str:
-    """Return a name without a unit in brackets behind it.
-
-    Examples
-    --------
-    >>> bare_name("M00 [1/sr]"), bare_name("[deg]")
-    ('M00', '[deg]')
-    """
-    return re.sub(r"\s*[\[(][^\[\]()]*[\])]$", "", name) or name
 
 
 def _split(name: str) -> tuple[str, str]:

@@ -15,6 +15,7 @@ from data_io.goniometer.tables.names import POLARISERS, STOKES, meaning_of
 from data_io.goniometer.tables.quantities import mueller_elements
 from data_io.goniometer.tables.settings import require_one_setting
 from data_io.goniometer.tables.table import read_table
+from data_io.goniometer.tables.unit_words import require_whole_of_per_cent
 from data_io.goniometer.tables.writing import NOTES
 from data_io.text.text import Line, without_comments
 from pbrdf.errors import DataFileError
@@ -67,6 +68,13 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     said = _quantity(path, table.comments)
     if quantity is not None and said is None and declared.quantity is None:
         _require_one_quantity(path, columns, quantity, head)
+    require_whole_of_per_cent(
+        path,
+        columns.values,
+        columns.per_cent,
+        declared.quantity or said or quantity or "brdf",
+        head,
+    )
     require_counted_from_zero(path, columns, values, declared, table.comments, head)
     _require_four(path, values, table.header)
     _drop_unity(path, values, columns.lines)

@@ -18,7 +18,8 @@ from data_io.goniometer.tables.cells import (
     sign_behind,
     without_empty_end,
 )
-from data_io.goniometer.tables.names import bare_name, meaning_of
+from data_io.goniometer.tables.names import meaning_of
+from data_io.goniometer.tables.units import unit_named, written_units
 from data_io.text.gaps import is_gap
 from data_io.text.text import Line, is_comment, without_comments
 from pbrdf.errors import DataFileError, shortened
@@ -29,10 +30,6 @@ __all__ = ["RawTable", "read_table"]
 
 # How other programs mark a comment; a semicolon only where it separates nothing
 _COMMENT = ("//", "!", "'")
-_UNITS = {
-    "", "-", "1", "deg", "rad", "°", "º", "nm", "um", "µm", "%", "degrees", "1/sr", "sr-1",
-    "sr^-1", "sr⁻¹", "/sr", "radians",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -65,11 +62,6 @@ class RawTable:
     comments: list[str]
     among: list[Line]
     separator: str | None
-
-    @property
-    def bare_names(self) -> list[str]:
-        """Names without units in brackets, as one types them."""
-        return [bare_name(name) for name in self.names]
 
     def numbers(self, path: Path, column: int) -> pd.Series:
         """Return a column as numbers, NaN for a gap.
@@ -243,8 +235,11 @@ def _with_units(names: Sequence[str], below: Sequence[str]) -> list[str]:
     """Return names with the units of the row below them in brackets."""
     if len(below) < len(names):
         return list(names)
+    # A unit that stands in the name too says nothing new
     return [
-        f"{name} [{unit.strip('[]()')}]" if unit.strip("[]() -") else name
+        f"{name} [{unit.strip('[]()')}]"
+        if unit.strip("[]() -") and unit_named(unit) not in written_units(name).units
+        else name
         for name, unit in zip(names, below, strict=False)
     ]
 
@@ -282,7 +277,7 @@ def _is_known(cell: str) -> bool:
 
 
 def _is_unit(cell: str) -> bool:
-    return cell.strip().strip("[]()").lower() in _UNITS
+    return unit_named(cell) is not None
 
 
 def _is_row(line: Line) -> bool:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from data_io.goniometer.scan import ConventionWarning
-from data_io.goniometer.tables.names import bare_name
 from data_io.goniometer.tables.table import RawTable
+from data_io.goniometer.tables.units import bare_name
 from data_io.text.gaps import is_gap
 from pbrdf.errors import DataFileError, shortened
 

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from data_io.goniometer.scan import STDERR
-from data_io.goniometer.tables.names import ANGLES, TARGETS, bare_name, meaning_of
+from data_io.goniometer.tables.names import ANGLES, TARGETS, meaning_of
 from data_io.goniometer.tables.table import RawTable
+from data_io.goniometer.tables.units import bare_name
 from pbrdf.errors import DataFileError
 from pbrdf.optics.published.columns import column_of
 
@@ -112,14 +113,17 @@ def _of_unit(name: str) -> str:
         return ""
     if meaning.name in ANGLES:
         return f"{name} is no angle in degrees or radians: convert it."
+    if meaning.name == "wavelength":
+        return f"{name} is in no unit of wavelengths that is known: convert it."
+    error = STDERR if meaning.stderr else ""
     if "sr" in name.removeprefix(bare):
         cure = f"--columns {bare}={meaning.name} or {bare}=M00 with --quantity brdf"
         if meaning.name.startswith("m"):
             cure = f"--columns {bare}={meaning.name} or {bare}={meaning.name.upper()}"
         return f"{name} has no unit by its name, and that of a BRDF behind it: give {cure}."
     return (
-        f"{name} is not in 1/sr: give --columns {bare}={bare} with --quantity relative, or "
-        "what it is."
+        f"{name} is not in 1/sr: give --columns {bare}={meaning.name}{error} with "
+        "--quantity relative, or what it is."
     )
 
 

@@ -1,0 +1,108 @@
+"""Units that stand in or beside the name of a column, whatever the name means."""
+
+import re
+from typing import NamedTuple
+
+from pbrdf.optics.published.columns import unit_of
+
+__all__ = ["ANGLE_UNITS", "Written", "bare_name", "unit_named", "written_units"]
+
+ANGLE_UNITS = {
+    **dict.fromkeys(("deg", "degree", "degrees", "°", "º"), "deg"),
+    **dict.fromkeys(("rad", "radian", "radians"), "rad"),
+}
+_PER_CENT = ("%", "percent", "per cent", "pct")
+_PER_SR = ("1/sr", "sr-1", "sr^-1", "sr⁻¹", "/sr")
+_BRACKET = re.compile(r"^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$")
+# What may stand behind a name without brackets and is nothing but a unit
+_BEHIND = re.compile(
+    r"^(.*[^\d\s_/,.-])(?:[\s_/,]+|(?=[%°º]))(%|°|º|deg|degrees?|[mu]?rad|radians?|gon|"
+    r"arcmin|arcsec|nm|um|µm|μm|angstroms?|percent|per cent|pct)$|"
+    r"^(.*\d)[\s_]+(%|percent|pct)$",
+    re.IGNORECASE,
+)
+_BASE = (
+    r"sr|rad|deg|gon|grad|arcmin|arcsec|eV|Hz|W|V|A|J|K|m|s|g|cts?|counts?|ppm|dB|bits?|"
+    r"px|a\.?u\.?|arb\.?(?: ?u(?:nits?)?\.?)?|inch|in|mil|°|%|‰|lm|lx|cd|rel\.?|relative"
+)
+_POWER = r"(?:\^?[-+\u2212⁻]?[\d⁰¹²³⁴]+|[⁻¹²³]+)?"
+_ONE = rf"(?:[fpnuµμmckMGT]?(?:{_BASE}){_POWER}|1)"
+_UNIT = re.compile(rf"{_ONE}(?:(?: ?[*·/.] ?| ){_ONE})*|/ ?{_ONE}")
+# "x 1000", "10^-3", "1e-3", "E-3"
+_SCALE = re.compile(
+    r"[x×*·/]? ?(?:10+|10 ?(?:\^|\*\*) ?[-+\u2212]?\d+|10[⁻⁺]?[¹²³⁴⁵⁶⁷⁸⁹]|"
+    r"\d?(?:\.\d+)?[eE][-+]?\d+)|[x×*·/] ?\d+"
+)
+# Of these single letters polarisations are meant
+_NO_UNIT = ("s", "p", "h")
+
+
+class Written(NamedTuple):
+    """A name without its units, and these, each in one spelling, "1" for none."""
+
+    name: str
+    units: tuple[str, ...]
+
+
+def unit_named(text: str) -> str | None:
+    """Return a unit in one spelling, or None of a text that is none.
+
+    Examples
+    --------
+    >>> unit_named("degrees"), unit_named("sr^-1"), unit_named("pct"), unit_named("Å")
+    ('deg', '1/sr', '%', 'angstrom')
+    >>> unit_named("1/msr"), unit_named("x 100"), unit_named("450 nm"), unit_named("BRDF")
+    ('1/msr', 'x 100', None, None)
+    """
+    bare = text.strip().strip("[]()").strip()
+    key = bare.lower()
+    if key in ("", "-", "1", "–", "—"):
+        return "1"
+    if key in _PER_CENT:
+        return "%"
+    if key in _PER_SR:
+        return "1/sr"
+    if key in _NO_UNIT:
+        return None
+    known = ANGLE_UNITS.get(key) or unit_of(bare)
+    return known or (bare if _UNIT.fullmatch(bare) or _SCALE.fullmatch(bare) else None)
+
+
+def written_units(name: str) -> Written:
+    """Take from a name the units in brackets behind it, and one that ends it.
+
+    Examples
+    --------
+    >>> written_units("wavelength_nm [um]")
+    Written(name='wavelength', units=('um', 'nm'))
+    >>> written_units("R (450 nm) [%]"), written_units("R_s").units
+    (Written(name='R (450 nm)', units=('%',)), ())
+    """
+    units = []
+    while (found := _BRACKET.match(name.strip())) and found[1]:
+        unit = unit_named(found[2])
+        if unit is None:
+            break
+        units.append(unit)
+        name = found[1]
+    behind = _BEHIND.match(name.strip())
+    if behind:
+        unit = behind[2] or behind[4]
+        units.append(unit_named(unit) or unit)
+        name = behind[1] or behind[3]
+    return Written(name.strip(), tuple(dict.fromkeys(units)))
+
+
+def bare_name(name: str) -> str:
+    """Return a name without units in brackets behind it, as one types it.
+
+    Examples
+    --------
+    >>> bare_name("M00 [1/sr]"), bare_name("[deg]"), bare_name("u(BRDF)")
+    ('M00', '[deg]', 'u(BRDF)')
+    """
+    while (found := _BRACKET.match(name.strip())) and found[1]:
+        if unit_named(found[2]) is None:
+            break
+        name = found[1]
+    return name

@@ -1,0 +1,150 @@
+"""Units in headers, rows and cells of tables: honoured, or refused with a cure that works."""
+
+# One line a file: the tables are read across
+# ruff: noqa: E501
+import re
+import warnings
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from data_io import ConventionWarning, read_goniometer
+from pbrdf.errors import DataFileError
+
+FACTOR = "reflectance-factor"
+
+
+def read(tmp_path, head, rows=("30,-30,0.32", "30,30,1.2"), **more):
+    path = tmp_path / "scan.csv"
+    path.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConventionWarning)
+        return read_goniometer(path, **more)
+
+
+def told(name):
+    return f"theta_i_deg,theta_view_deg,{name}"
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "columns"),
+    [
+        (told("R [%]"), None, {"R": "M00"}),
+        (told("R [%]"), None, {"R [%]": "M00"}),
+        (told("R_percent"), None, {"R_percent": "M00"}),
+        (told("R") + "\ndeg,deg,%", None, {"R": "M00"}),
+        (told("R"), ("30,-30,0.32%", "30,30,1.2 %"), {"R": "M00"}),
+        (told("Refl [%]"), None, {"Refl": FACTOR}),
+        (told("BRDF [%]"), None, {}),
+    ],
+)
+def test_per_cent_stays_per_cent_under_any_name(tmp_path, head, rows, columns):
+    rows = {} if rows is None else {"rows": rows}
+    scan = read(tmp_path, head, **rows, columns=columns, quantity=FACTOR)
+    assert_allclose(scan.M00, np.array([0.0032, 0.012]) / np.pi, rtol=1e-12)
+
+
+def test_per_cent_of_polarised_light(tmp_path):
+    rows = ("30,-30,10,0.2", "30,30,20,0.5")
+    scan = read(tmp_path, told("DoP [%],BRDF"), rows, columns={"DoP": "DOLP"})
+    assert_allclose(scan.DOLP, [0.1, 0.2])
+    scan = read(
+        tmp_path, told("Rs [%],Rp [%]"), rows,
+        columns={"Rs": "I_s", "Rp": "I_p"}, quantity=FACTOR,
+    )  # fmt: skip
+    assert_allclose(scan.I_s, np.array([0.1, 0.2]) / np.pi)
+
+
+def options(message):
+    """Return the mappings and quantities that a message names, as they are written."""
+    pair = r"[^=,]+=[\w-]+"
+    said = re.findall(
+        rf"--columns ({pair}(?:,{pair})*)(?: with --quantity ([\w-]+))?", message
+    )
+    for pairs, quantity in said:
+        mapping = dict(pair.rsplit("=", 1) for pair in pairs.split(","))
+        yield mapping, quantity or None
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "columns", "named"),
+    [
+        (told("BRDF [1/msr]"), "30,20,30", {"BRDF": "M00"}, "1/msr"),
+        (told("BRDF [x 1000]"), "30,20,30", {"BRDF": "M00"}, "x 1000"),
+        (told("S [V]"), "30,20,30", {"S": "M00"}, "V"),
+        (told("S") + "\ndeg,deg,mV", "30,20,30", {"S": "M00"}, "mV"),
+        (told("BRDF,L [A]"), "30,20,.1,5500", {"L": "wavelength_nm"}, "angstrom"),
+        (told("BRDF,Laser [um]"), "30,20,.1,.55", {"Laser": "wavelength_nm"}, "um"),
+        (told("BRDF,wavelength_nm") + "\ndeg,deg,1/sr,um", "30,20,.1,10.6", {}, "um"),
+        ("theta_i_deg,theta_s_deg,RAA [rad],BRDF", "30,20,3,.1", {"RAA": "dphi_deg"}, "rad"),
+        ("AOI_rad,theta_view_deg,BRDF", "0.5,20,.1", {"AOI_rad": "theta_i_deg"}, "rad"),
+    ],
+)  # fmt: skip
+def test_a_mapping_that_contradicts_a_unit_is_refused(tmp_path, head, row, columns, named):
+    with pytest.raises(DataFileError) as refused:
+        read(tmp_path, head, [row], columns=columns)
+    message = str(refused.value)
+    assert f"[{named}]" in message
+    cures = list(options(message))
+    assert cures
+    for mapping, quantity in cures:
+        scan = read(tmp_path, head, [row], columns=mapping, quantity=quantity)
+        if "10.6" in row:
+            chosen = {"wavelength_um": 10.6, "wavelength_nm": 0.0106}[
+                next(iter(mapping.values()))
+            ]
+            assert_allclose(scan.wavelength, chosen)
+        elif "wavelength" in scan.coords:
+            assert_allclose(scan.wavelength, 0.55)
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "columns"),
+    [
+        ("AOI [gon],theta_view_deg,BRDF", "30,20,.1", {"AOI": "theta_i_deg"}),
+        (told("BRDF,half angle [mrad]"), "30,20,.1,9", {"half angle": "detector_half_angle_deg"}),
+        (told("BRDF,err [%]"), "30,20,.03,2", {"err": "M00_stderr"}),
+        (told("BRDF,err_pct"), "30,20,.03,2", {"err_pct": "M00_stderr"}),
+        (told("BRDF [%]"), "30,20,3", {}),
+        (told("R [%]"), "30,20,3", {"R": "M00"}),
+        (told("DoP [1/msr],BRDF"), "30,20,.1,.1", {"DoP": "DOLP"}),
+    ],
+)  # fmt: skip
+def test_a_unit_that_cannot_be_honoured_is_refused(tmp_path, head, row, columns):
+    with pytest.raises(DataFileError, match=r"gon|mrad|standard error|per cent|%"):
+        read(tmp_path, head, [row], columns=columns)
+
+
+def test_errors_in_per_cent_say_of_what(tmp_path):
+    (tmp_path / "s.csv").write_text(told("BRF [%],BRF_stderr [%]") + "\n30,20,10,2\n")
+    with pytest.warns(ConventionWarning, match="20 % of the middle reading"):
+        scan = read_goniometer(tmp_path / "s.csv")
+    assert_allclose(scan.M00_stderr, 0.02 / np.pi)
+    read_goniometer(tmp_path / "s.csv", columns={"BRF_stderr": "ignore"})
+
+
+def test_units_may_stand_in_names_and_below(tmp_path):
+    head = "theta_i [deg],theta_view_deg,BRDF [1/sr],wavelength_nm\ndeg,°,sr^-1,nm"
+    scan = read(tmp_path, head, ["30,20,.1,550"])
+    assert_allclose(scan.wavelength, 0.55)
+    assert_allclose(scan.M00, 0.1)
+
+
+def test_names_with_brackets_are_mapped_as_they_stand(tmp_path):
+    rows = ("30,-30,0.03,0.001", "30,30,0.1,0.002")
+    with pytest.raises(DataFileError) as refused:
+        read(tmp_path, told("BRDF,u(BRDF)"), rows)
+    mapping, _ = next(options(str(refused.value)))
+    assert mapping == {"u(BRDF)": "M00_stderr"}
+    scan = read(tmp_path, told("BRDF,u(BRDF)"), rows, columns=mapping)
+    assert_allclose(scan.M00_stderr, [0.001, 0.002])
+
+
+def test_wavelengths_in_brackets_head_columns(tmp_path):
+    scan = read(tmp_path, told("BRDF (450 nm),BRDF (0.55 um) [1/sr]"), ["30,20,.1,.2"])
+    assert_allclose(scan.wavelength, [0.45, 0.55])
+    assert_allclose(scan.M00, [0.1, 0.2])
+    mapping = {"R (450 nm)": "M00_450nm"}
+    scan = read(tmp_path, told("R (450 nm)"), ["30,20,.1"], columns=mapping)
+    assert_allclose(scan.wavelength, 0.45)
