@@ -127,6 +127,9 @@ def compare_dew(  # noqa: PLR0913  (a scene, an amount and a run)
     # Drops are laid anew in every run, and the azimuth is averaged over
     whole.attrs["isotropic"] = isotropic(surface)
     whole.attrs |= {"warnings": told, "runs": runs, "seed": seed}
+    # The states have no scene in common but the surface under the water
+    if "scene" in results[0].attrs:
+        whole.attrs["dry_scene"] = results[0].attrs["scene"]
     return whole.drop_vars(["brdf_runs", "one_path"])
 
 

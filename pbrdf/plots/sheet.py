@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COLOURS",
+    "MM",
     "WIDTHS",
     "beam_of",
     "halo",
@@ -170,7 +171,7 @@ def beam_of(result: xr.Dataset) -> str:
 
 def scene_of(result: xr.Dataset) -> str:
     """Describe the scene of a result in a line, empty where it is not recorded."""
-    scene = tables_of(str(result.attrs.get("scene", "")))
+    scene = tables_of(str(result.attrs.get("scene", result.attrs.get("dry_scene", ""))))
     parts = []
     surface = scene.get("surface", {})
     if surface:

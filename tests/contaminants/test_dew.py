@@ -8,8 +8,10 @@ from numpy.testing import assert_allclose
 
 from pbrdf import GaussianSurface, HeightMap, Material
 from pbrdf.cli import main
+from pbrdf.cli.dew_figures import signature_figure
 from pbrdf.dew import compare_dew, jackknife
 from pbrdf.errors import AccuracyWarning
+from tests.pictures.readable import unreadable
 
 PAINT, WATER = Material(1.5), Material(1.333)
 SURFACE = GaussianSurface(shape=(64, 64), spacing=2.0, corr_length=30.0, slope_rms=0.05)
@@ -146,3 +148,22 @@ def test_a_warning_that_differs_in_its_numbers_is_told_once():
     assert len(told) == 1
     assert told[0].endswith("(and 2 more with other numbers)")
     assert told[0] in result.attrs["warnings"]
+
+
+def test_the_figure_of_numbers_says_what_it_shows(result):
+    figure = signature_figure(result)
+    title = figure.get_suptitle()
+    assert "gaussian surface slope 0.05, n 1.5" in title
+    assert "P = √(M10² + M20² + M30²)" in title
+    assert "2 standard errors" in title
+    lobe = figure.axes[0]
+    dry = result.isel(state=0, theta_i=0).sel(region="lobe", quantity="P")
+    band = lobe.patches[0].get_bbox()
+    assert_allclose(
+        [band.y0, band.y1],
+        dry.signature.item() + np.array([-2, 2]) * dry.signature_stderr.item(),
+    )
+    # The legend lies below the axes, whose lines it covered
+    legend = figure.legends[0]
+    assert {text.get_text() for text in legend.get_texts()} >= {"incidence 50°", "dry"}
+    assert unreadable(figure) == []
