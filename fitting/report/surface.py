@@ -211,6 +211,12 @@ def _draw_spectrum(axis: "Axes", found: "SurfaceStatistics") -> None:
             1 / one.cutoff, color=colour, linewidth=0.8, linestyle=":",
             label="resolved" if one is found.axes[-1] else None,
         )  # fmt: skip
+    # The model of a smooth map falls by tens of decades beyond what was measured
+    dots = [line.get_ydata() for line in axis.lines if line.get_linestyle() == "None"]
+    seen = np.concatenate([np.asarray(one, dtype=float) for one in dots] or [np.array([])])
+    seen = seen[np.isfinite(seen) & (seen > 0)]
+    if seen.size:
+        axis.set_ylim(seen.min() / 3, 3 * seen.max())
     axis.set(
         xlabel="spatial frequency [1/um]", ylabel="spectrum [um³]",
         title="one-sided spectrum",

@@ -51,8 +51,11 @@ def file_size(path: str | Path, most: int = MOST_BYTES) -> int:
     try:
         found = Path(path).stat()
     except FileNotFoundError as error:
-        problem = "expected a file, found none of that name"
-        raise DataFileError(path, problem, "Check the path.") from error
+        problem, cure = "expected a file, found none of that name", "Check the path."
+        if str(path) == "-":
+            problem = "expected a file, standard input is not read"
+            cure = "Save it to a file and name that."
+        raise DataFileError(path, problem, cure) from error
     except (OSError, ValueError) as error:
         text = getattr(error, "strerror", None) or str(error)
         problem = f"expected a readable file, got: {text}"

@@ -197,6 +197,8 @@ BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
     "sweep out of range": (["sweep", "scene.toml", "--vary", "kappa=-1"], "kappa"),
     "plot of nothing": (["plot", "profile.csv"], "profile.csv"),
     "export to nowhere": (["export", "scene.toml", "-o", "scene.obj"], ".pbsdf"),
+    "scan from a pipe": (["check", "-"], "standard input is not read. Save it"),
+    "export to a pipe": (["export", "scene.toml", "-o", "-"], "to standard output"),
     "dew beyond 180 degrees": (
         ["dew", "--contact-angles-deg", "15,200"],
         "--contact-angles-deg",

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,11 +16,13 @@ import xarray as xr
 from numpy.testing import assert_allclose
 
 import data_io
+from data_io.reflectance.table_accuracy import GRAZING
 from pbrdf import Material, MicrofacetModel, load_scene
 from pbrdf.cli import app, main
 from pbrdf.cli.converted import in_convention
 from pbrdf.cli.progress import StageBars, Talk, talk
 from pbrdf.cli.showing.doctor import self_test
+from pbrdf.cli.showing.export import _accuracy_lines
 from pbrdf.cli.showing.init import Kind
 from pbrdf.cli.wording import in_options, options_of
 from pbrdf.optics.exchange import convert_brdf
@@ -117,6 +120,34 @@ def test_an_angle_beyond_the_horizon_is_refused_in_degrees(tmp_path, capsys):
     capsys.readouterr()
     assert main(["simulate", str(path), "--theta-i-deg", "30,95"]) == 2
     assert "--theta-i-deg must lie in [0, 90) degrees, got 95" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_starter_scenes_have_a_remark_on_each_number(kind, capsys):
+    assert main(["init", "-", "--kind", kind.value]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    numbers = [line for line in lines if re.search(r"^\w+ = [\[\d]", line)]
+    assert numbers
+    assert [line for line in numbers if not re.search(r"# \w+", line)] == []
+
+
+def test_an_export_says_whether_its_error_at_grazing_matters():
+    names = ["above 10 %", GRAZING]
+    error = np.full((2, 2, 1, 1), 0.004)
+    error[1, 1] = 3700.0
+    found = xr.Dataset(
+        {"error": (("brightness", "quantile", "stokes_out", "stokes_in"), error),
+         "count": ("brightness", [10, 10])},
+        {"brightness": names, "quantile": ["median", "worst"]},
+    )  # fmt: skip
+    _, bright, grazing, remark = _accuracy_lines(found)
+    assert "worst 0.4 %" in bright
+    assert "worst 3.7e+03 times M00" in grazing
+    # What a Lambertian surface sends beyond 85 degrees
+    share = np.cos(np.deg2rad(85.0)) ** 2
+    assert (
+        f"matters only where the light or the viewer grazes: {100 * share:.1f} %" in remark
+    )
 
 
 def test_a_model_becomes_a_table(tmp_path):

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 from numpy.testing import assert_allclose
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
 from data_io import Profile, read_goniometer, write_result
 from fitting.checks.unread import what_hangs_together
@@ -15,7 +15,9 @@ from fitting.quick import run_quick
 from fitting.report import html
 from fitting.report.explorer import fit_summary, origin, page_of
 from fitting.report.quick_page import write_quick
-from pbrdf import Material
+from fitting.report.surface import surface_figure
+from fitting.statistics.surface import surface_statistics
+from pbrdf import HeightMap, Material
 from pbrdf.cli import main
 from tests.fits.test_pipeline import write_scan
 from tests.pictures.results import hand_made
@@ -149,3 +151,19 @@ def test_the_page_of_a_simulation_explains_only_what_it_shows():
     assert re.search(r"in the median bin and \d+ % in the worst", page)
     fitted = page_of(result.assign_attrs(monte_carlo_fit=fit("good", 0.8)), "r.nc")
     assert "factor on the surface reflection" in fitted
+
+
+def test_the_spectrum_of_a_smooth_map_is_as_tall_as_its_data():
+    heights = np.random.default_rng(2).standard_normal((96, 96))
+    surface = HeightMap(gaussian_filter(heights, 6.0, mode="wrap"), 1.0)
+    figure = surface_figure(surface, surface_statistics(surface))
+    (axis,) = (one for one in figure.axes if "spectrum" in one.get_title())
+    dots = np.concatenate(
+        [line.get_ydata() for line in axis.lines if line.get_marker() == "."]
+    )
+    lines = [line.get_ydata() for line in axis.lines if line.get_linestyle() == "-"]
+    low, high = axis.get_ylim()
+    assert low < dots.min() < dots.max() < high
+    assert low > dots.min() / 10
+    assert high < 10 * dots.max()
+    assert min(line.min() for line in lines) < low

@@ -104,6 +104,9 @@ def _check(
     """Refuse what cannot be written."""
     from data_io import is_result_store
 
+    if str(output) == "-":
+        msg = "--output must be a file, got '-': nothing goes to standard output. Name one."
+        raise ValueError(msg)
     if output.suffix not in (".pbsdf", ".csv"):
         known = ", ".join((".pbsdf", ".csv", *MESHES))
         msg = f"--output must end in one of {known}, got {output.name!r}."
@@ -168,6 +171,8 @@ def write_table(rows: "xr.Dataset", path: Path, convention: Convention) -> None:
 
 def _accuracy_lines(accuracy: "xr.Dataset") -> Iterator[str]:
     """Yield how far the file is from its source, a line a class of brightness."""
+    from data_io.reflectance.table_accuracy import GRAZING
+
     yield "Between its nodes it differs from the source, in parts of M00:"
     for name in accuracy.brightness.values:
         here = accuracy.sel(brightness=name)
@@ -176,12 +181,23 @@ def _accuracy_lines(accuracy: "xr.Dataset") -> Iterator[str]:
         first = here.error.isel(stokes_out=0, stokes_in=0)
         others = here.error.max(["stokes_out", "stokes_in"])
         shares = ", ".join(
-            f"{label} {100 * float(first.sel(quantile=label)):.2g} % (worst element "
-            f"{100 * float(others.sel(quantile=label)):.2g} %)"
+            f"{label} {_size(first.sel(quantile=label))} (worst element "
+            f"{_size(others.sel(quantile=label))})"
             for label in here["quantile"].values
         )
         what = f"M00 {name} of its peak" if "%" in name else f"zeniths {name}"
         yield f"  {what}: {shares}"
+        if name == GRAZING:
+            yield (
+                "    It matters only where the light or the viewer grazes: 0.8 % of the "
+                "light of an evenly bright surface lies there (cos² 85°)."
+            )
+
+
+def _size(error: "xr.DataArray") -> str:
+    """Return a part of M00 as a percentage, or as a multiple."""
+    part = float(error)
+    return f"{100 * part:.2g} %" if part < 1 else f"{part:.3g} times M00"
 
 
 def export_mesh(

@@ -20,8 +20,8 @@ corr_length_um = 16.0     # where the autocorrelation falls to 1/e
 slope_rms = 0.15          # per axis; or height_rms_um
 
 [substrate]
-n = 1.5
-kappa = 0.0
+n = 1.5                   # refractive index of the binder
+kappa = 0.0               # its imaginary part: no absorption
 diffuse_albedo = 0.2      # of the base under the interface
 """
 
@@ -31,13 +31,13 @@ VINYL = """\
 
 [surface]
 type = "gaussian"
-shape = [256, 256]
-spacing_um = 0.9
-corr_length_um = 14.5
-height_rms_um = 2.6
+shape = [256, 256]        # cells; the surface repeats beyond them
+spacing_um = 0.9          # a sixteenth of the correlation length or less
+corr_length_um = 14.5     # where the autocorrelation falls to 1/e
+height_rms_um = 2.6       # or slope_rms, per axis
 
 [substrate]
-material = "pvc"
+material = "pvc"          # a name of `pbrdf.materials`; or n and kappa
 """
 
 METAL = """\
@@ -45,13 +45,13 @@ METAL = """\
 
 [surface]
 type = "gaussian"
-shape = [256, 256]
-spacing_um = 1.0
-corr_length_um = 16.0
-slope_rms = 0.3
+shape = [256, 256]        # cells; the surface repeats beyond them
+spacing_um = 1.0          # a sixteenth of the correlation length or less
+corr_length_um = 16.0     # where the autocorrelation falls to 1/e
+slope_rms = 0.3           # per axis; or height_rms_um
 
 [substrate]
-material = "aluminium"
+material = "aluminium"    # a name of `pbrdf.materials`; or n and kappa
 """
 
 DEW = """\
@@ -59,21 +59,21 @@ DEW = """\
 
 [surface]
 type = "gaussian"
-shape = [256, 256]
-spacing_um = 1.0
-corr_length_um = 32.0
-slope_rms = 0.05
+shape = [256, 256]        # cells; the surface repeats beyond them
+spacing_um = 1.0          # a sixteenth of the correlation length or less
+corr_length_um = 32.0     # where the autocorrelation falls to 1/e
+slope_rms = 0.05          # per axis; or height_rms_um
 
 [substrate]
-n = 1.5
+n = 1.5                   # refractive index; kappa = 0, it does not absorb
 
 [[contaminants]]
 type = "drops"
-material = "water"
-contact_angle_deg = 90.0
-volume_per_area_um = 2.0
-number_density_per_mm2 = 500.0
-seed = 1
+material = "water"              # of the drops
+contact_angle_deg = 90.0        # between surface and drop, through the water
+volume_per_area_um = 2.0        # thickness of the water if it were a film
+number_density_per_mm2 = 500.0  # drops on a square millimetre
+seed = 1                        # of the places of the drops
 """
 
 FILM = """\
@@ -81,18 +81,18 @@ FILM = """\
 
 [surface]
 type = "gaussian"
-shape = [256, 256]
-spacing_um = 1.0
-corr_length_um = 24.0
-slope_rms = 0.1
+shape = [256, 256]        # cells; the surface repeats beyond them
+spacing_um = 1.0          # a sixteenth of the correlation length or less
+corr_length_um = 24.0     # where the autocorrelation falls to 1/e
+slope_rms = 0.1           # per axis; or height_rms_um
 
 [substrate]
-n = 1.5
+n = 1.5                   # refractive index; kappa = 0, it does not absorb
 
 [[contaminants]]
 type = "film"
-material = "water"
-thickness_um = 20.0
+material = "water"        # of the film
+thickness_um = 20.0       # even everywhere; interference is not modelled
 """
 
 MAP = """\
@@ -102,11 +102,11 @@ MAP = """\
 [surface]
 type = "height_map"
 file = "heights.npy"
-spacing_um = 0.5
-periodic = false
+spacing_um = 0.5          # step of the grid; or two, of x and of y
+periodic = false          # true if its borders continue each other
 
 [substrate]
-n = 1.5
+n = 1.5                   # refractive index; kappa = 0, it does not absorb
 """
 
 MESH = """\
@@ -122,7 +122,7 @@ file = "mesh.stl"
 # transparent = [1]         # labels of closed parts that light goes through, or true
 
 [substrate]
-n = 1.5
+n = 1.5                   # refractive index; kappa = 0, it does not absorb
 # or a list in the order of the labels: materials = [{n = 1.5}, {material = "aluminium"}]
 """
 
