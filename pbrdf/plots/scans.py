@@ -30,7 +30,11 @@ _FAR = 20.0
 
 
 def scan_figure(
-    measured: xr.Dataset, curves: xr.Dataset | None = None, *, width_mm: float = 170.0
+    measured: xr.Dataset,
+    curves: xr.Dataset | None = None,
+    *,
+    width_mm: float = 170.0,
+    label: str = "measured",
 ) -> "Figure":
     """Draw M00, M10 and their ratio against view angle: measured, analytical, Monte Carlo.
 
@@ -48,16 +52,33 @@ def scan_figure(
     width_mm : float
         Width that the figure is printed at; below 115 mm the quantities stand in a column.
         [mm]
+    label : str
+        What the rows are called, where they are no readings.
     """
     from matplotlib import rc_context
 
     with rc_context(small()):
-        figure = _drawn(measured, curves, width(width_mm))
+        figure = _drawn(_in_the_plane(measured), curves, width(width_mm), label)
     lay_out(figure)
     return figure
 
 
-def _drawn(measured: xr.Dataset, curves: xr.Dataset | None, inches: float) -> "Figure":
+def _in_the_plane(measured: xr.Dataset) -> xr.Dataset:
+    """Leave out other azimuths at the zenith, which lies in every plane."""
+    if "dphi" not in measured.coords:
+        return measured
+    apart = np.abs(np.sin(measured.dphi.values)) > 1e-6
+    upright = np.abs(measured.theta_view.values) < 1e-6
+    apart = np.broadcast_to(apart, upright.shape)
+    # A scan may have no other row there
+    if not (upright & ~apart).any():
+        return measured
+    return measured.isel(geometry=np.flatnonzero(~(upright & apart)))
+
+
+def _drawn(
+    measured: xr.Dataset, curves: xr.Dataset | None, inches: float, label: str
+) -> "Figure":
     measured, names = _with_ratio(measured)
     names = {name: label for name, label in names.items() if name in measured}
     panels = list(_panels(measured))
@@ -83,7 +104,7 @@ def _drawn(measured: xr.Dataset, curves: xr.Dataset | None, inches: float) -> "F
             _draw_curves(upper, name, curve)
             _draw_residuals(axes[per * row + 1, column], name, scan, curve)
             upper.tick_params(labelbottom=False)
-        _draw_points(upper, name, scan)
+        _draw_points(upper, name, scan, label)
         upper.set_title(f"{names[name]}" + ("\n" if columns > 1 else ", ") + title)
         if name == "M00" and _spans_decades(scan[name].values):
             # Down to the readings: a model may fall for ever
@@ -171,12 +192,12 @@ def _draw_curves(axis: "Axes", name: str, curve: xr.Dataset) -> None:
             )
 
 
-def _draw_points(axis: "Axes", name: str, scan: xr.Dataset) -> None:
+def _draw_points(axis: "Axes", name: str, scan: xr.Dataset, label: str) -> None:
     error = scan[f"{name}_stderr"].values if f"{name}_stderr" in scan else None
     axis.errorbar(
         np.rad2deg(scan.theta_view.values), scan[name].values, error,
         fmt="o", markersize=2.6, elinewidth=0.7, color="0.3", mfc="white", mew=0.8,
-        label="measured", zorder=3,
+        label=label, zorder=3,
     )  # fmt: skip
 
 

@@ -6,11 +6,13 @@ import xarray as xr
 from matplotlib.patches import PathPatch
 from numpy.testing import assert_allclose
 
-from data_io import Profile, write_result
+from data_io import Profile, in_plane, read_goniometer, write_goniometer, write_result
 from fitting import surface_statistics
 from fitting.report.surface import surface_figure
-from pbrdf import GaussianSurface
+from pbrdf import GaussianSurface, Material, MicrofacetModel
 from pbrdf.cli import main
+from pbrdf.cli.showing.export import model_rows
+from pbrdf.cli.showing.plot import _origin
 from pbrdf.derived.places import choose
 from pbrdf.plots import hemisphere, new_figure, plane_cuts, scan_figure
 from pbrdf.plots.limits import reach_of
@@ -224,6 +226,20 @@ def test_residuals_are_points_in_standard_errors():
     assert np.isnan(found[0])
     expected = (np.deg2rad([-20.0, 20.0, 40.0]) + 0.3) / np.hypot(0.1, 0.075)
     assert_allclose(found[1:], expected)
+
+
+def test_a_table_of_a_model_is_one_cut_and_called_so(tmp_path):
+    rows = model_rows(MicrofacetModel(Material(1.5), slope_rms=0.2), [0.5], None)
+    write_goniometer(rows, tmp_path / "t.csv")
+    cut = in_plane(read_goniometer(tmp_path / "t.csv"))
+    assert _origin(cut) == "model"
+    figure = scan_figure(cut, label=_origin(cut))
+    points = figure.axes[0].lines[0].get_xdata()
+    # At the zenith both azimuths of the plane are one direction
+    assert np.sum(np.abs(points) < 1e-3) == 2
+    assert len(points) == 2 * 17
+    (words,) = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == "model"
 
 
 def test_each_incidence_and_wavelength_has_its_panel():

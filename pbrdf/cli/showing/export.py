@@ -24,6 +24,8 @@ class Convention(StrEnum):
     paper = "paper"
 
 
+# First comment of a table that nobody measured
+MODEL, SIMULATION = "values of a model", "values of a simulation"
 # Formats of meshes
 MESHES = (".glb", ".stl", ".ply")
 
@@ -235,7 +237,8 @@ def model_rows(
     coords = {"theta_i": theta_i, "theta_s": theta_s, "dphi": dphi}
     if wavelength is not None:
         coords["wavelength"] = np.full(len(theta_i), wavelength)
-    return xr.Dataset(rows, {name: ("geometry", value) for name, value in coords.items()})
+    held = {name: ("geometry", value) for name, value in coords.items()}
+    return xr.Dataset(rows, held, {"comments": MODEL})
 
 
 def as_rows(result: "xr.Dataset") -> "xr.Dataset":
@@ -259,4 +262,4 @@ def as_rows(result: "xr.Dataset") -> "xr.Dataset":
             spread = error.sel(here).values
             rows[f"{element}_stderr"] = ("geometry", np.where(spread > 0.0, spread, np.nan))
     coords = {name: ("geometry", np.asarray(total[name])) for name in axes}
-    return xr.Dataset(rows, coords)
+    return xr.Dataset(rows, coords, {"comments": SIMULATION})

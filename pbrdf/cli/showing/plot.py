@@ -10,6 +10,7 @@ import typer
 from pbrdf.cli import declaring, option_text, options
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 
@@ -124,9 +125,18 @@ def command(
             if not scan.sizes["geometry"]:
                 msg = f"{source.name} must have rows in the plane of incidence, got none."
                 raise ValueError(msg)
-            figure = scan_figure(scan, width_mm=width_mm)
+            figure = scan_figure(scan, width_mm=width_mm, label=_origin(scan))
         figure.savefig(stage, dpi=200)
     typer.echo(f"Figure: {target}")
+
+
+def _origin(scan: "xr.Dataset") -> str:
+    """Return what the rows of a table are, by its comments."""
+    from pbrdf.cli.showing.export import MODEL, SIMULATION
+
+    lines = str(scan.attrs.get("comments", "")).splitlines()
+    kinds = {MODEL: "model", SIMULATION: "simulated"}
+    return next((word for line, word in kinds.items() if line in lines), "measured")
 
 
 def _of_store(
