@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from data_io.goniometer.scan import NORMALISED, STDERR, Scan
+from data_io.goniometer.scan import INTENSITIES, NORMALISED, STDERR, Scan
 from data_io.goniometer.scatter import curve_keys, standard_errors
 
 __all__ = ["check_agreement", "check_fractions", "check_parts", "errors_of"]
@@ -91,18 +91,26 @@ def check_parts(scan: Scan) -> None:
         return
     whole = scan.values["M00"]
     floor = _DARK * float(np.nanmax(np.abs(whole), initial=0.0))
-    for name in ("I_s", "I_p"):
+    # Of an unpolarised source a polariser before the surface passes half
+    for name, most in {
+        "I_s": 1.0,
+        "I_p": 1.0,
+        **dict.fromkeys(INTENSITIES[2:], 2.0),
+    }.items():
         if name not in scan.values:
             continue
-        error = _joint(scan, {name: 1.0, "M00": 1.0})
-        part = np.where(error > 0.0, _TOLERANCE, _UNKNOWN) * np.abs(whole)
-        beyond = scan.values[name] - whole > part + _FAR * error + floor
+        error = _joint(scan, {name: 1.0, "M00": most})
+        part = most * np.where(error > 0.0, _TOLERANCE, _UNKNOWN) * np.abs(whole)
+        beyond = scan.values[name] - most * whole > part + _FAR * error + floor
         if beyond.any():
             row = int(np.argmax(beyond))
             problem = (
-                f"expected at most M00 = {whole[row]:.6g}, got {scan.values[name][row]:.6g}"
+                f"expected at most {'2 ' if most > 1.0 else ''}M00 = "
+                f"{most * whole[row]:.6g}, got {scan.values[name][row]:.6g}"
             )
             cure = "Behind an analyser is a part of all light: I_s + I_p = M00."
+            if most > 1.0:
+                cure = "M00 is half of f_ss + f_sp + f_ps + f_pp."
             raise scan.fault(beyond, name, problem, cure)
 
 

@@ -8,7 +8,7 @@ from data_io.goniometer.agreement import (
     check_parts,
     errors_of,
 )
-from data_io.goniometer.scan import ELEMENTS, INTENSITIES, NORMALISED, STDERR, Scan
+from data_io.goniometer.scan import ELEMENTS, INTENSITIES, NORMALISED, RATIOS, STDERR, Scan
 from pbrdf.errors import DataFileError
 
 __all__ = ["check"]
@@ -135,7 +135,10 @@ def _check_values(scan: Scan) -> None:
                 value = values[np.argmax(negative)]
                 problem = f"expected a value >= 0, got {value:.9g}"
                 cure = _negative_cure(name, value)
-                if negative.sum() > max(0.5 * np.isfinite(values).sum(), 2.0):
+                # A polariser leaves light, but an offset may be more than that
+                if name == "M00" and negative.sum() > max(
+                    0.5 * np.isfinite(values).sum(), 2.0
+                ):
                     cure = "Of logarithms or decibels write the numbers themselves."
                 raise scan.fault(negative, name, problem, cure)
         if name.endswith(STDERR) and name.removesuffix(STDERR) not in scan.values:
@@ -145,7 +148,30 @@ def _check_values(scan: Scan) -> None:
     if all(np.isnan(values).all() for values in scan.values.values()):
         problem = "expected measured values, every cell is empty"
         raise DataFileError(scan.path, problem, "Export the scan again.")
+    _check_errors(scan)
     _check_normalisation(scan)
+
+
+def _check_errors(scan: Scan) -> None:
+    """Refuse standard errors that mostly exceed the brightest reading: per cent, mostly."""
+    for name, values in scan.values.items():
+        error = scan.values.get(name + STDERR)
+        ratio = name in RATIOS
+        if error is None or not np.isfinite(error).any() or (
+            not ratio and name not in ("M00", *INTENSITIES)
+        ):  # fmt: skip
+            continue
+        most = 1.0 if ratio else float(np.nanmax(np.abs(values), initial=0.0))
+        typical = float(np.nanmedian(error))
+        if most > 0.0 and typical > most:
+            below = "1" if ratio else f"the brightest reading, {most:.4g}"
+            problem = f"expected standard errors below {below}, got mostly {typical:.4g}"
+            column = scan.names.get(name + STDERR, name + STDERR)
+            cure = (
+                "Of errors in per cent of each reading write the errors themselves; or "
+                f"leave the column out, --columns {column}=ignore."
+            )
+            raise scan.fault(error > most, name + STDERR, problem, cure)
 
 
 def _refuse_marks(scan: Scan, name: str) -> None:
@@ -173,6 +199,12 @@ def _negative_cure(name: str, value: float) -> str:
         return _LEAVE
     if name == "DOLP":
         return "A signed Q/I is m10 = M10/M00: name the column so."
+    if name in INTENSITIES:
+        return (
+            "A dark signal too large, or of another setting, was subtracted: take that of "
+            f"the same setting. Readings below zero within their noise, {name}{STDERR}, "
+            "are kept."
+        )
     return (
         f"Readings below zero within their noise are kept: give it as {name}{STDERR}. "
         "Leaving them out biases a fit."
@@ -216,7 +248,11 @@ def _check_normalisation(scan: Scan) -> None:
                 f"expected at most M00 = {intensity[row]:.6g} in size, got "
                 f"{scan.values[name][row]:.6g}, which no surface reflects"
             )
-            raise scan.fault(impossible, name, problem, f"Mend the row. {_LEAVE}")
+            cure = f"Mend the row. {_LEAVE}"
+            others = [scan.values[n] for n in ELEMENTS[1:] if n in scan.values]
+            if max(np.nanmax(np.abs(v), initial=0.0) for v in others) <= 1.0:
+                cure = f"If the elements are divided by M00, give --normalised. {cure}"
+            raise scan.fault(impossible, name, problem, cure)
 
 
 def _check_ratios(scan: Scan) -> None:

@@ -1,16 +1,27 @@
 """The checked rows of a goniometer file as a dataset."""
 
+import warnings
 from hashlib import sha256
 
 import numpy as np
 import xarray as xr
 
 from data_io.goniometer.checks import check
-from data_io.goniometer.scan import CONVENTIONS, RATIOS, STDERR, Scan
+from data_io.goniometer.scan import (
+    CONVENTIONS,
+    RATIOS,
+    STDERR,
+    ConventionWarning,
+    Scan,
+)
 
 __all__ = ["to_dataset"]
 
 _SAME_DEG = 1e-6
+# Two computations of one value differ by this [largest value]
+_ROUNDING = 1e-9
+# Standard errors that are beyond noise
+_FAR = 5.0
 _OPTIONAL = {
     "phi_i": "azimuth of the source",
     "source_half_angle": "half-angle of the source",
@@ -71,7 +82,11 @@ def _units(name: str, quantity: str) -> str:
 
 
 def _distinct(scan: Scan) -> np.ndarray:
-    """Return the rows to keep: the first of each geometry, if repeats say the same."""
+    """Return the rows to keep: the first of each geometry, if repeats say the same.
+
+    A turn that ends where it began, at 0 and 360 degrees, repeats a reading within its
+    standard error.
+    """
     azimuths = [scan.dphi] + ([] if scan.phi_i is None else [scan.phi_i])
     others = [scan.theta_i, scan.theta_s]
     others += [] if scan.wavelength is None else [scan.wavelength]
@@ -80,9 +95,22 @@ def _distinct(scan: Scan) -> np.ndarray:
     keys = np.column_stack([np.rint(np.column_stack(others) / _SAME_DEG), turns])
     _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     original = first[inverse.ravel()]
+    closing = np.abs(scan.dphi - scan.dphi[original]) > 180.0
+    noisy = np.zeros(original.size, dtype=bool)
     for name, values in scan.values.items():
         reference = values[original]
-        differs = (values != reference) & ~(np.isnan(values) & np.isnan(reference))
+        apart = np.abs(values - reference)
+        largest = max(
+            np.nanmax(np.abs(scan.values.get(n, values)), initial=0.0)
+            for n in (name, "M00")
+        )
+        equal = apart <= _ROUNDING * (1.0 if name in RATIOS else largest)
+        equal |= np.isnan(values) & np.isnan(reference)
+        error = scan.values.get(name + STDERR, np.zeros(values.size))
+        within = apart <= _FAR * np.hypot(error, error[original])
+        within |= np.full(values.size, name.endswith(STDERR))
+        noisy |= ~equal & closing & within
+        differs = ~equal & ~(closing & within)
         if differs.any():
             row = int(np.argmax(differs))
             problem = (
@@ -96,4 +124,12 @@ def _distinct(scan: Scan) -> np.ndarray:
                     f"each kind a file. Else: {cure[0].lower()}{cure[1:]}"
                 )
             raise scan.fault(differs, name, problem, cure)
+    if noisy.any():
+        row = int(np.argmax(noisy))
+        msg = (
+            f"{scan.path.name}: {noisy.sum()} readings repeat the direction of another a "
+            f"turn apart, within their standard errors, first line {scan.lines[row]}; the "
+            "first of each counts."
+        )
+        warnings.warn(msg, ConventionWarning, stacklevel=4)
     return np.sort(first)

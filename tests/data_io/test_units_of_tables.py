@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from data_io import ConventionWarning, read_goniometer
+from pbrdf import materials
 from pbrdf.errors import DataFileError
 
 FACTOR = "reflectance-factor"
@@ -148,3 +149,12 @@ def test_wavelengths_in_brackets_head_columns(tmp_path):
     mapping = {"R (450 nm)": "M00_450nm"}
     scan = read(tmp_path, told("R (450 nm)"), ["30,20,.1"], columns=mapping)
     assert_allclose(scan.wavelength, 0.45)
+
+
+def test_constants_may_repeat_their_unit_below(tmp_path):
+    path = tmp_path / "constants.csv"
+    path.write_text("wavelength_nm,n,k\nnm,-,-\n400,1.6,.1\n800,1.5,.2\n")
+    assert_allclose(materials.read(path).index(0.8), (1.5, 0.2))
+    path.write_text("wavelength_nm,n,k\num,-,-\n400,1.6,.1\n800,1.5,.2\n")
+    with pytest.raises(DataFileError, match=r"wavelength_nm \[um\]"):
+        materials.read(path)

@@ -21,6 +21,8 @@ from data_io.text.text import Line, without_comments
 from pbrdf.errors import DataFileError
 
 _QUANTITY = re.compile(r"quantity\b\s*([:=]?)\s*(.+)", re.IGNORECASE)
+# sin(theta_s) |sin(dphi)| of a reading that counts as in plane
+_PLANE = 2e-3
 # What four polarisers give
 _BY_POLARISERS = ("M00", "M10", "M20")
 # What gives an element, beside the column of its own name
@@ -75,7 +77,8 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
         declared.quantity or said or quantity or "brdf",
         head,
     )
-    require_counted_from_zero(path, columns, values, declared, table.comments, head)
+    in_plane = np.sin(np.radians(theta_s)) * np.abs(np.sin(np.radians(dphi))) < _PLANE
+    require_counted_from_zero(path, columns, in_plane, declared, table.comments, head)
     _require_four(path, values, table.header)
     _drop_unity(path, values, columns.lines)
     # The notes that are written into every file need not pile up

@@ -37,6 +37,7 @@ _WITH_COSINE = re.compile(
 )
 _REFLECTANCE = re.compile(r"^(?:r|refl|reflectance|reflectivity)$", re.IGNORECASE)
 _SPECTRAL = re.compile(r"^(?:photon[\s_]*)?energy$|^wave[\s_]*numbers?$|^frequency$", re.I)
+_ELEMENT = re.compile(r"^([Mm])([1-4])([1-4])(/[Mm]11)?((?:_stderr)?)$")
 _FROM_ONE = re.compile(r"^m(?:4[1-4]|[1-3]4|[1-4]{2}/m11)$", re.IGNORECASE)
 
 
@@ -55,13 +56,31 @@ def unknown_columns(
     if without_unit:
         listed = ", ".join(map(repr, without_unit))
         said.append(f"expected the unit of the angles {listed}, found none")
-    cures = _cures(unknown, without_unit)
+    cures = _cures(unknown, without_unit, table.names)
     return DataFileError(
         path, "; ".join(said), " ".join([*cures, COLUMNS_CURE]), line=table.header
     )
 
 
-def _cures(unknown: Sequence[str], without_unit: Sequence[str]) -> list[str]:
+def _from_one(names: Sequence[str]) -> str:
+    """Return the mapping of all elements that a table counts from 1.
+
+    >>> _from_one(["BRDF", "m12 [1]", "M34_stderr", "m33/m11"])
+    'm12=m01,M34_stderr=M23_stderr,m33/m11=m22'
+    """
+    pairs = []
+    for name in map(bare_name, names):
+        found = _ELEMENT.match(name)
+        if found:
+            letter = "m" if found[4] else found[1]
+            target = f"{letter}{int(found[2]) - 1}{int(found[3]) - 1}{found[5]}"
+            pairs.append(f"{name}={target}")
+    return ",".join(pairs)
+
+
+def _cures(
+    unknown: Sequence[str], without_unit: Sequence[str], names: Sequence[str] = ()
+) -> list[str]:
     """Return what the reader may do about these columns."""
     pairs, cures = [], []
     for name in (*unknown, *without_unit):
@@ -76,7 +95,9 @@ def _cures(unknown: Sequence[str], without_unit: Sequence[str]) -> list[str]:
     if waves:
         cures.append(f"Where wavelengths head columns, give --columns {','.join(waves)}.")
     if any(map(_FROM_ONE.match, unknown)):
-        cures.append("Elements are counted from 0 here: --columns M11=M00,M12=M01,...")
+        cures.append(
+            f"Elements are counted from 0 here: --columns {_from_one(names or unknown)}."
+        )
     if pairs:
         hints = ", ".join(pair.partition("=")[2] for pair in pairs)
         cures.append(f"Did you mean {hints}? Then give --columns {','.join(pairs)}.")

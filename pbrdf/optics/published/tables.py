@@ -149,7 +149,7 @@ def _columns(
         below = cells_of(units.text, separator_of(units.text))
         below += [""] * (len(cells) - len(below))
         pairs = zip(cells, below, strict=False)
-        cells = [f"{name} [{u.strip('[]()')}]" if unit_of(u) else name for name, u in pairs]
+        cells = [_with_unit(name, unit) for name, unit in pairs]
     found = [
         # A first column without a name counts the rows, as in tables of pandas
         Column(cell, IGNORED)
@@ -180,6 +180,14 @@ def _columns(
         cure = "Head the column wavelength_nm, wavelength_um, energy_ev or wavenumber_cm-1."
         raise DataFileError(path, problem, cure, line=header.number, column=spectral.name)
     return columns
+
+
+def _with_unit(name: str, below: str) -> str:
+    """Return a name with the unit below it, unless it names the same one itself."""
+    unit, own = unit_of(below), column_of(name)
+    if unit is None or (own is not None and own.unit == unit):
+        return name
+    return f"{name} [{below.strip('[]()')}]"
 
 
 def _rows(
