@@ -109,11 +109,13 @@ def unit_size(name: str) -> float:
     return ANGLE_UNITS[key] if key in ANGLE_UNITS else unit_factor(name)
 
 
-def warn_missing_unit(path: str | Path, *, stacklevel: int) -> None:
+def warn_missing_unit(
+    path: str | Path, *, stacklevel: int, example: str = "x_um,z_um"
+) -> None:
     """Say that a file without unit is taken as micrometres."""
     msg = (
         f"{Path(path).name}: no length unit is named, micrometres are assumed. "
-        "Name units in the header (x_um,z_um), or give unit=."
+        f"Name units in the header ({example}), or give unit=."
     )
     warnings.warn(msg, MissingUnitWarning, stacklevel=stacklevel)
 

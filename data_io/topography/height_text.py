@@ -102,7 +102,7 @@ def read_text_map(
     else:
         found_map = with_spacing(path, build_map(path, rows * size, steps), spacing)
     if factor is None and unit is None:
-        warn_missing_unit(path, stacklevel=6)
+        warn_missing_unit(path, stacklevel=6, example="# unit = nm")
     return found_map
 
 
@@ -139,7 +139,7 @@ def _read_list(
     columns = read_numbers(path, data, names, gaps=True, columns=places)
     units = _list_units(path, header, axes)
     if not units and unit is None:
-        warn_missing_unit(path, stacklevel=7)
+        warn_missing_unit(path, stacklevel=7, example="x_um,y_um,z_um")
     if units and unit is not None:
         problem = f"expected no unit argument, the header says {', '.join(units)}"
         cure = "Leave the argument out."

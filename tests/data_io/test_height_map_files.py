@@ -11,6 +11,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
 from data_io import MissingUnitWarning, read_height_map, read_profile
+from pbrdf.cli import main
 from pbrdf.errors import DataFileError
 
 # Rows of constant y: 3 rows, 4 columns, no symmetry, one missing point
@@ -124,6 +125,19 @@ def test_a_map_without_unit_is_micrometres_and_says_so(tmp_path, text, options):
     with pytest.warns(MissingUnitWarning, match=r"map\.xyz.*micrometres") as caught:
         assert_allclose(read_height_map(path, **options).heights, ROWS.T)
     assert caught[0].filename == __file__
+
+
+@pytest.mark.filterwarnings("always::data_io.MissingUnitWarning")
+@pytest.mark.parametrize(
+    "words", [["statistics", "MAP"], ["pipeline", "MAP", "none.csv", "--n", "1.5"]]
+)
+def test_every_command_warns_of_a_matrix_without_unit(tmp_path, words, capsys):
+    path = write(tmp_path, matrix_text())
+    words = [str(path) if word == "MAP" else word for word in words]
+    assert main([*words, "--spacing-um", "1"]) == 2
+    said = capsys.readouterr().err
+    assert "warning: map.csv: no length unit is named, micrometres are assumed" in said
+    assert "(# unit = nm), or give --unit" in said
 
 
 @pytest.mark.parametrize(

@@ -154,3 +154,19 @@ def test_the_cut_has_room_for_its_bars(tmp_path):
         cut = result.brdf_total[0, 0, :, [0, 4], 0, 0]
         ends = float(cut.max()) + 2 * 0.25
         assert f"{ends:.3g}" in answer["lettered"]
+
+
+def test_wet_minus_dry_is_offered_and_told(tmp_path):
+    dry = hand_made(waves=(0.45,), n_theta=BINS[0], n_dphi=BINS[1])
+    wet = dry.assign(brdf_total=1.25 * dry.brdf_total)
+    both = xr.concat([dry, wet], xr.Variable("state", ["dry", "30 deg"]))
+    page = page_of(both, "dew.nc")
+    assert "at Show “minus dry”, for what water changes" in page
+    assert "minus dry" not in re.sub(
+        "<script>.*?</script>", "", page_of(dry, "r.nc"), flags=re.S
+    )
+    asks = [({"dim0": "30 deg", "show": "minus dry"}, 2, 3, *BINS)]
+    added = 0.25 * float(element(dry, "M00").value[0, 0, 2, 3])
+    for out in asked(page, asks, tmp_path).values():
+        assert out["errors"] == []
+        np.testing.assert_allclose(number(out["answers"][0][0])[0], added, rtol=6e-3)
