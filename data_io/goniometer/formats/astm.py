@@ -1,30 +1,23 @@
 """Text files after ASTM E1392 and E2387: keywords, a line VARS of names, rows of numbers.
 
 theta_i, phi_i and theta_s, phi_s are the directions of source and detector, in degrees, so
-that dphi = phi_s - phi_i. NUM_POINTS announces the rows.
+that dphi = phi_s - phi_i. NUM_POINTS announces the rows. Other keywords are remarks, of
+which those on wavelength, quantity and polarisation count.
 """
 
 import re
-import warnings
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from data_io.goniometer.declarations import Declared
-from data_io.goniometer.scan import ConventionWarning, Scan
+from data_io.goniometer.scan import Scan
 from data_io.goniometer.tables import own_csv
 from data_io.goniometer.tables.names import ANGLES, meaning_of
 from data_io.text.text import Line, is_number
 from pbrdf.errors import DataFileError
-from pbrdf.optics.published.columns import Column, unit_of
 
 # Names of what was read that do not say in which unit
 _UNDECLARED = {"intensity", "power", "signal", "counts"}
-_WAVELENGTH = re.compile(
-    r"\s*(?:LASER[ _])?WAVELENGTH\s*[=:]?\s*(\d+(?:\.\d+)?)\s*([^\s\d]\S*)?\s*$",
-    re.IGNORECASE,
-)
 
 
 NAME, TAKES = "astm", own_csv.TAKES
@@ -55,30 +48,12 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
         raise DataFileError(path, problem, "The file is truncated or has extra rows.")
     header = Line(content[at].number, ",".join(names))
     table = [Line(r.number, ",".join(re.split(r"[\s,;]+", r.text.strip()))) for r in rows]
-    scan = own_csv.read(path, [header, *table], declared)
+    said = [Line(line.number, f"# {line.text.strip()}") for line in content[:at]]
+    scan = own_csv.read(path, [*said, header, *table], declared)
     title = next((c.text.strip()[6:] for c in content if c.text.startswith("TITLE ")), "")
     keywords = "\n".join(line.text.strip() for line in content[:at])
     own = {"format": "astm", "title": title.strip(), "comments": keywords}
-    wavelength = scan.wavelength
-    if wavelength is None:
-        wavelength = _wavelength(path, content[:at], len(scan.theta_i))
-    return replace(scan, attrs={**scan.attrs, **own}, wavelength=wavelength)
-
-
-def _wavelength(path: Path, header: list[Line], rows: int) -> np.ndarray | None:
-    """Return the wavelength that a keyword gives all rows, None without one. [um]"""
-    found = [match for line in header if (match := _WAVELENGTH.match(line.text))]
-    if not found:
-        return None
-    size, unit = float(found[0][1]), unit_of(found[0][2] or "")
-    if unit is None:
-        msg = (
-            f"{path.name}: the wavelength {size:g} names no unit and is left out: write "
-            "WAVELENGTH 633 nm."
-        )
-        warnings.warn(msg, ConventionWarning, stacklevel=4)
-        return None
-    return np.full(rows, Column("wavelength", "wavelength", unit).to_um([size])[0])
+    return replace(scan, attrs={**scan.attrs, **own})
 
 
 def _name(path: Path, line: Line, word: str, declared: Declared) -> str:

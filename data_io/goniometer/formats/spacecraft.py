@@ -5,18 +5,17 @@ signed: -20 at azimuth 0 is 20 at azimuth 180 degrees. Values at the floor of th
 are not measured, and become NaN.
 """
 
-import re
 from pathlib import Path
 
 import numpy as np
 
 from data_io.goniometer.declarations import Declared
+from data_io.goniometer.remarks.settings import one_wavelength
 from data_io.goniometer.scan import Scan
 from data_io.text.text import Line, Rows, is_comment, read_numbers
 from pbrdf.errors import DataFileError
 
 _COLUMNS = ["phi_i", "theta_i", "phi_o", "theta_o", "brdf"]
-_NANOMETRES = re.compile(r"(\d+(?:\.\d+)?)\s*nm\b")
 # So many equal values at the bottom are the instrument's floor
 _FLOOR_REPEATS = 3
 
@@ -49,7 +48,7 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     zenith_i, azimuth_i, zenith_s, azimuth_s, brdf = table.T
     lowest = brdf.min()
     at_floor = (brdf == lowest) & ((brdf == lowest).sum() >= _FLOOR_REPEATS)
-    wavelengths = {float(v) for text in comments for v in _NANOMETRES.findall(text)}
+    wavelength = one_wavelength(path, comments)
     attrs: dict[str, object] = {
         "format": "spacecraft",
         "title": comments[0] if comments else path.stem,
@@ -66,9 +65,7 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
             azimuth_s - azimuth_i + 180.0 * (zenith_s < 0) - 180.0 * (zenith_i < 0), 360.0
         ),
         values={"M00": np.where(at_floor, np.nan, brdf)},
-        wavelength=np.full(brdf.size, wavelengths.pop() * 1e-3)
-        if len(wavelengths) == 1
-        else None,
+        wavelength=None if wavelength is None else np.full(brdf.size, wavelength),
         names={"theta_i": "phi_i", "theta_s": "phi_o", "dphi": "theta_o", "M00": "brdf"},
         attrs=attrs,
     )

@@ -6,7 +6,6 @@ exactly 0 above it means that nothing was measured there, and becomes NaN. Sampl
 the azimuth of the plane of incidence on the sample: several become phi_i.
 """
 
-import re
 import warnings
 from itertools import zip_longest
 from pathlib import Path
@@ -14,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from data_io.goniometer.declarations import Declared
+from data_io.goniometer.remarks.settings import one_wavelength
 from data_io.goniometer.scan import ConventionWarning, Scan
 from data_io.text.text import Line, is_comment, is_number, without_comments
 from pbrdf.errors import DataFileError
@@ -27,7 +27,6 @@ _REQUIRED = {
 # Files in circulation state a TIS without the cosine, or of half the space; a table in
 # other units misses by more
 _TIS_FACTOR = 2.5
-_NANOMETRES = re.compile(r"(\d+(?:\.\d+)?)\s*nm\b")
 
 
 NAME, TAKES = "zemax", ()
@@ -62,7 +61,7 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     measured = np.where(blocks == 0, np.nan, blocks)
     scatter = _integrals(axes, blocks, stated)
     _compare_scatter(path, axes, scatter, stated)
-    wavelength = _wavelength(comments)
+    wavelength = one_wavelength(path, comments)
     return Scan(
         path=path,
         lines=[int(n) for n in numbers[real]],
@@ -121,12 +120,6 @@ def from_specular(
 
 def _word(line: Line) -> str:
     return line.text.split()[0]
-
-
-def _wavelength(comments: list[str]) -> float | None:
-    """Return the wavelength that the comments name, if they name exactly one. [um]"""
-    found = {float(value) for text in comments for value in _NANOMETRES.findall(text)}
-    return found.pop() * 1e-3 if len(found) == 1 else None
 
 
 def _header(path: Path, header: list[Line]) -> dict[str, np.ndarray]:

@@ -16,7 +16,7 @@ from pbrdf.errors import DataFileError
 
 __all__ = [
     "cells_of", "is_plain", "numbers_of", "require_one_notation", "separator_of",
-    "sign_behind", "without_empty_end",
+    "sign_behind", "without_counter", "without_empty_end",
 ]  # fmt: skip
 
 _SEPARATORS = (";", "\t", "|", ",")
@@ -180,3 +180,22 @@ def without_empty_end(row: list[str], width: int) -> list[str]:
     """
     empty = len(list(takewhile(lambda cell: not cell, reversed(row[width:]))))
     return row[: len(row) - empty]
+
+
+def without_counter(
+    names: Sequence[str], cells: pd.DataFrame
+) -> tuple[list[str], pd.DataFrame]:
+    """Take out a first column without a name that counts the rows; number other ones.
+
+    Tables of pandas have such a column.
+    """
+    first = pd.to_numeric(cells.iloc[:, 0], errors="coerce").to_numpy(float)
+    nameless = not names[0] or re.fullmatch(r"Unnamed: \d+", names[0])
+    if (
+        nameless
+        and len(names) > 1
+        and (first[:1] % 1 == 0).all()
+        and ((first - first[:1] == range(len(first))).all())
+    ):
+        names, cells = names[1:], cells.iloc[:, 1:]
+    return [name or f"column {k}" for k, name in enumerate(names, 1)], cells

@@ -1,26 +1,29 @@
 """Tables with names of columns: the project's own CSV, and those of others."""
 
-import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from data_io.goniometer.declarations import QUANTITY_NAMES, Declared
+from data_io.goniometer.declarations import Declared
+from data_io.goniometer.remarks.quantity import stated_quantity
+from data_io.goniometer.remarks.settings import (
+    brightness_only,
+    with_settings,
+)
+from data_io.goniometer.remarks.words import polarisation_of, quantity_of
 from data_io.goniometer.scan import ELEMENTS, INTENSITIES, STDERR, Scan
 from data_io.goniometer.tables.angles import directions
 from data_io.goniometer.tables.columns import Columns, read_columns
 from data_io.goniometer.tables.counting import require_counted_from_zero
 from data_io.goniometer.tables.names import POLARISERS, STOKES, meaning_of
 from data_io.goniometer.tables.quantities import mueller_elements
-from data_io.goniometer.tables.settings import require_one_setting
 from data_io.goniometer.tables.table import read_table
 from data_io.goniometer.tables.unit_words import require_whole_of_per_cent
 from data_io.goniometer.tables.writing import NOTES
 from data_io.text.text import Line, without_comments
 from pbrdf.errors import DataFileError
 
-_QUANTITY = re.compile(r"quantity\b\s*([:=]?)\s*(.+)", re.IGNORECASE)
 # sin(theta_s) |sin(dphi)| of a reading that counts as in plane
 _PLANE = 2e-3
 # What four polarisers give
@@ -54,7 +57,7 @@ def looks_like(lines: list[Line]) -> bool:
 def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     """Read the rows of a table, in degrees and under the project's names."""
     table = read_table(path, lines)
-    columns = read_columns(path, table, declared)
+    columns = with_settings(path, table, read_columns(path, table, declared), declared)
     theta_i, theta_s, dphi, phi_i, detector = directions(
         path, columns, declared, table.header
     )
@@ -64,10 +67,9 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
         raise DataFileError(path, problem, cure, line=table.header, column="M00")
     head = table.header
     _require_one_source(path, columns, head)
-    require_one_setting(path, table, columns)
+    columns, said = stated_quantity(path, table, columns, declared)
     _require_all_errors(path, columns.values, head)
     values, quantity = mueller_elements(columns.values)
-    said = _quantity(path, table.comments)
     if quantity is not None and said is None and declared.quantity is None:
         _require_one_quantity(path, columns, quantity, head)
     require_whole_of_per_cent(
@@ -82,7 +84,8 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     _require_four(path, values, table.header)
     _drop_unity(path, values, columns.lines)
     # The notes that are written into every file need not pile up
-    kept = [text for text in table.comments if text and not _noted(text)]
+    plain = brightness_only(columns)
+    kept = [text for text in table.comments if text and not _noted(text, plain)]
     return Scan(
         path=path,
         lines=columns.lines,
@@ -183,37 +186,14 @@ def _drop_unity(path: Path, values: dict[str, np.ndarray], lines: list[int]) -> 
         raise DataFileError(path, problem, cure, line=lines[row], column="m00")
 
 
-def _noted(text: str) -> bool:
-    """Tell whether a comment is one that is written, now or in earlier versions."""
+def _noted(text: str, plain: bool) -> bool:
+    """Tell whether a comment is one that is written, now or in earlier versions.
+
+    So is the quantity; and a polarisation above readings that are declared to have none.
+    """
     return (
         text in NOTES
         or text.startswith(("Angles in rad, dphi", "M in 1/sr without"))
-        or _said(text) is not None
+        or quantity_of(text) is not None
+        or (plain and polarisation_of(text) is not None)
     )
-
-
-def _said(text: str) -> str | None:
-    """Return the quantity that a comment names, in the spelling of the names.
-
-    >>> _said("Quantity: reflectance factor (pi times the BRDF)")
-    'reflectance-factor'
-    >>> _said("quantity of paint 3 g")
-    """
-    match = _QUANTITY.fullmatch(text)
-    if match is None:
-        return None
-    bare = re.sub(r"\s*[\[(].*", "", match[2]).strip().rstrip(".")
-    name = re.sub(r"[\s_-]+", "-", bare).lower()
-    name = {"brf": "reflectance-factor"}.get(name, name)
-    return name if name in QUANTITY_NAMES or match[1] else None
-
-
-def _quantity(path: Path, comments: list[str]) -> str | None:
-    """Return what a comment such as "quantity: relative" declares."""
-    found = list(dict.fromkeys(said for text in comments if (said := _said(text))))
-    wrong = [said for said in found if said not in QUANTITY_NAMES]
-    if wrong or len(found) > 1:
-        got = ", ".join(map(repr, wrong or found))
-        problem = f"expected quantity: {' or '.join(QUANTITY_NAMES)}, got {got}"
-        raise DataFileError(path, problem, "Mend the comment.")
-    return found[0] if found else None

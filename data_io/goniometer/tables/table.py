@@ -16,6 +16,7 @@ from data_io.goniometer.tables.cells import (
     require_one_notation,
     separator_of,
     sign_behind,
+    without_counter,
     without_empty_end,
 )
 from data_io.goniometer.tables.names import meaning_of
@@ -49,8 +50,8 @@ class RawTable:
         Line of the names.
     comments : list of str
         Comment lines, and lines above the names.
-    among : list of Line
-        Those of them that stand below the names, where they may tell of rows below them.
+    remarks : list of Line
+        Those lines with their numbers, and lines of words among the rows.
     separator : str or None
         What separates the cells; None is white space.
     """
@@ -60,8 +61,20 @@ class RawTable:
     lines: list[int]
     header: int
     comments: list[str]
-    among: list[Line]
+    remarks: list[Line]
     separator: str | None
+
+    @property
+    def above(self) -> list[str]:
+        """Remarks on all rows: above the first or below the last."""
+        first, last = self.lines[0], self.lines[-1]
+        return [line.text for line in self.remarks if not first < line.number < last]
+
+    @property
+    def among(self) -> list[Line]:
+        """Remarks among the rows, which may tell of rows below them."""
+        first, last = self.lines[0], self.lines[-1]
+        return [line for line in self.remarks if first < line.number < last]
 
     def numbers(self, path: Path, column: int) -> pd.Series:
         """Return a column as numbers, NaN for a gap.
@@ -121,7 +134,8 @@ def read_table(path: Path, lines: Sequence[Line]) -> RawTable:
     check_columns(path, (line.text for line in lines))
     # Spreadsheets leave rows of separators
     content = [line for line in without_comments(lines) if line.text.strip(",;\t ")]
-    comments = [line.text.strip().lstrip("#% ") for line in lines if is_comment(line)]
+    remarks = [line for line in lines if is_comment(line)]
+    comments = [line.text.strip().lstrip("#% ") for line in remarks]
     if not content:
         problem = "expected names of columns and rows of numbers, found none"
         raise DataFileError(path, problem, "The file is truncated.")
@@ -141,22 +155,21 @@ def read_table(path: Path, lines: Sequence[Line]) -> RawTable:
     between = content[len(above) + 1 : top]
     names = cells_of(head.text, separator)
     heads = [names, *(cells_of(line.text, separator) for line in between)]
-    rows, among = _rows(path, content[top:], heads, separator)
-    among += [line for line in lines if is_comment(line) and line.number > head.number]
+    rows, words = _rows(path, content[top:], heads, separator)
     while len(names) > 1 and not names[-1] and not any(row[-1] for _, row in rows):
         names = names[:-1]
         rows = [(line, row[:-1]) for line, row in rows]
     if between:
         names = _with_units(names, heads[1])
     cells = pd.DataFrame([row for _, row in rows], dtype=str)
-    names, cells = _without_counter(names, cells)
+    names, cells = without_counter(names, cells)
     return RawTable(
         names=_with_signs(names, cells),
         cells=cells,
         lines=[line.number for line, _ in rows],
         header=head.number,
         comments=[*comments, *(line.text.strip() for line in above)],
-        among=among,
+        remarks=sorted([*remarks, *above, *words]),
         separator=separator,
     )
 
@@ -210,25 +223,6 @@ def _rows(
 def _apart(text: str) -> list[str]:
     """Return the cells of a line by its own separator."""
     return cells_of(text, separator_of(text))
-
-
-def _without_counter(
-    names: Sequence[str], cells: pd.DataFrame
-) -> tuple[list[str], pd.DataFrame]:
-    """Take out a first column without a name that counts the rows; number other ones.
-
-    Tables of pandas have such a column.
-    """
-    first = pd.to_numeric(cells.iloc[:, 0], errors="coerce").to_numpy(float)
-    nameless = not names[0] or re.fullmatch(r"Unnamed: \d+", names[0])
-    if (
-        nameless
-        and len(names) > 1
-        and (first[:1] % 1 == 0).all()
-        and ((first - first[:1] == range(len(first))).all())
-    ):
-        names, cells = names[1:], cells.iloc[:, 1:]
-    return [name or f"column {k}" for k, name in enumerate(names, 1)], cells
 
 
 def _with_units(names: Sequence[str], below: Sequence[str]) -> list[str]:

@@ -5,6 +5,7 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
+from data_io.goniometer.remarks.words import POLARISATIONS, UNPOLARISED
 from data_io.goniometer.scan import ConventionWarning
 from data_io.goniometer.tables.table import RawTable
 from data_io.goniometer.tables.units import bare_name
@@ -13,17 +14,10 @@ from pbrdf.errors import DataFileError, shortened
 
 __all__ = ["say_left_out"]
 
-# Light along e_s and along e_p
-_POLARISATIONS = {
-    "s": "s", "te": "s", "perpendicular": "s", "senkrecht": "s", "s-pol": "s",
-    "p": "p", "tm": "p", "parallel": "p", "p-pol": "p",
-    "ss": "ss", "sp": "sp", "ps": "ps", "pp": "pp",
-}  # fmt: skip
 # What says of each reading whether it counts
 _MARKS = re.compile(
     r"flag|qualit|valid|saturat|status|mask|reject|outlier|discard|overload", re.IGNORECASE
 )
-_UNPOLARISED = {"u", "unpol", "unpol.", "unpolarised", "unpolarized", "none"}
 # Remarks are many or alike; a few words that come again tell rows apart
 _SHOWN = 4
 
@@ -74,10 +68,11 @@ def _refuse_polarisation(
 ) -> None:
     """Refuse rows of single polarisations, which are read from columns."""
     plain = [word.lower() for word in words]
-    known = [word for word in plain if word in _POLARISATIONS]
+    known = [word for word in plain if word in POLARISATIONS]
     named = "pol" in name.lower()
-    if not known or not (named or len(known) == len(plain)):
-        if not named or all(word in _UNPOLARISED for word in plain):
+    all_known = all(word in POLARISATIONS or word in UNPOLARISED for word in plain)
+    if not known or not (named or all_known):
+        if not named or all(word in UNPOLARISED for word in plain):
             return
         known = plain
     bare = bare_name(name)
@@ -86,7 +81,7 @@ def _refuse_polarisation(
         "Give each polarisation a column of its own, I_s and I_p (or f_ss, f_sp, f_ps, "
         f"f_pp); --columns {bare}=ignore if the rows do not differ by it."
     )
-    one = {_POLARISATIONS.get(word, "") for word in known}
+    one = {POLARISATIONS.get(word, "") for word in known}
     if len(words) == 1 and one and len(letter := one.pop()) == 1:
         cure = (
             f"The readings are light of one polarisation: --columns NAME=I_{letter},"
