@@ -14,6 +14,8 @@ __all__ = ["colour_bar", "draw_disc"]
 
 # Straight pieces that make a circle round
 _ROUND = 72
+# Width of a label of a bar [in], and length of a bar in that of its panels
+_LABEL, _BAR = 0.42, 0.7
 # End of the colours of AOLP [deg]
 _AOLP_END = 90.0
 
@@ -71,8 +73,10 @@ def draw_disc(axis: Any, panel: Panel, look: Any, incidence: float) -> Any:
     return image
 
 
-def colour_bar(figure: "Figure", axes: list[Any], image: Any, look: Any) -> None:
-    """Draw a colour bar below panels that share it."""
+def colour_bar(
+    figure: "Figure", axes: list[Any], image: Any, look: Any, panels: int, room: float
+) -> None:
+    """Draw a bar below panels that share it, with the labels of so many, so wide [in]."""
     norm, _, options = look
     count = len(axes)
     bar = figure.colorbar(
@@ -80,7 +84,7 @@ def colour_bar(figure: "Figure", axes: list[Any], image: Any, look: Any) -> None
         aspect=22 if count == 1 else 18 * count, pad=0.03, **options,
     )  # fmt: skip
     bar.outline.set_linewidth(0.4)
-    _few_ticks(bar, norm, "ticks" in options and norm.vmax != _AOLP_END, count)
+    _few_ticks(bar, norm, "ticks" in options and norm.vmax != _AOLP_END, panels, room)
 
 
 def _hatch(axis: Any, azimuth: np.ndarray, zenith: np.ndarray, cells: np.ndarray) -> None:
@@ -106,8 +110,8 @@ def _hatch(axis: Any, azimuth: np.ndarray, zenith: np.ndarray, cells: np.ndarray
     )  # fmt: skip
 
 
-def _few_ticks(bar: Any, norm: Any, symmetric: bool, panels: int) -> None:
-    """Keep as many ticks as there is room for below so many panels."""
+def _few_ticks(bar: Any, norm: Any, symmetric: bool, panels: int, room: float) -> None:
+    """Keep as many ticks as there is room for below so many panels, so wide [in]."""
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
@@ -118,7 +122,14 @@ def _few_ticks(bar: Any, norm: Any, symmetric: bool, panels: int) -> None:
         return f"${'-' if value < 0 else ''}10^{{{exponent}}}$"
 
     if symmetric:
-        positive = [t for t in bar.get_ticks() if t >= norm.linthresh][-panels:]
+        step = _LABEL / (_BAR * room)
+        positive, last = [], np.inf
+        for tick in sorted(bar.get_ticks(), reverse=True):
+            place = float(norm(tick))
+            if tick >= norm.linthresh and min(last - place, place - norm(0.0)) >= step:
+                positive.append(tick)
+                last = place
+        positive = positive[:panels]
         kept = sorted({0.0, *positive, *([-t for t in positive] if norm.vmin < 0 else [])})
         bar.set_ticks(kept)
         bar.formatter = FuncFormatter(power)

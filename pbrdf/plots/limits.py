@@ -82,7 +82,11 @@ def look_of(
     size = np.abs(values[np.isfinite(values)])
     if scale == "auto":
         lit = size[size > 0]
-        wide = name != "DOLP" and lit.size > 0 and top > 30 * np.median(lit)
+        wide = (
+            not name.endswith(("DOLP", "difference of AOLP"))
+            and lit.size > 0
+            and top > 30 * np.median(lit)
+        )
         scale = ("symlog" if signed else "log") if wide else "linear"
     if scale == "log" and signed:
         if np.nanmin(values) < 0:

@@ -83,10 +83,10 @@ def _rows_of_states(
             for s, p in parts.items()
             if s != minus
         }
-        yield [_panel("difference", title, p) for title, p in rest.items()]
+        yield [_panel(f"difference of {name}", title, p) for title, p in rest.items()]
         if errors:
             yield [
-                _error_panel("difference", f"error of {title}", p)
+                _error_panel(f"difference of {name}", f"error of {title}", p)
                 for title, p in rest.items()
             ]
 

@@ -11,7 +11,16 @@ from pbrdf.derived.places import choose, in_words
 from pbrdf.plots.disc import colour_bar, draw_disc
 from pbrdf.plots.limits import look_of
 from pbrdf.plots.panels import Panel, rows_of
-from pbrdf.plots.sheet import beam_of, lay_out, point_of, scene_of, small, title_of, width
+from pbrdf.plots.sheet import (
+    beam_of,
+    in_lines,
+    lay_out,
+    point_of,
+    scene_of,
+    small,
+    title_of,
+    width,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -107,18 +116,15 @@ def hemisphere(
     with rc_context(small()):
         figure = _drawn(here, drawn, inches)
         note = "★ source   + specular   hatched: below 2 standard errors"
-        heading = "\n".join(
-            line
-            for line in (
-                title_of(here) + (", folded about the plane" if mirrored else ""),
-                point_of(here),
-                scene_of(here),
-                beam_of(here).replace(" (dotted)", ""),
-                note if inches > 4.5 else note.replace("   hatched", "\nhatched"),
-            )
-            if line
-        )
-        figure.suptitle(heading)
+        note = note if inches > 4.5 else note.replace("   hatched", ", hatched")
+        heading = [
+            title_of(here) + (", folded about the plane" if mirrored else ""),
+            point_of(here),
+            scene_of(here),
+            beam_of(here).replace(" (dotted)", ""),
+            note,
+        ]
+        figure.suptitle(in_lines(heading, inches))
     # Its ticks are the same at any size
     lay_out(figure, rounds=1)
     return figure
@@ -135,7 +141,7 @@ def _drawn(here: xr.Dataset, rows: list[list[_Look]], inches: float) -> "Figure"
     incidence = float(np.rad2deg(here.theta_i))
     for number, row in enumerate(rows):
         # A difference stands below what it is of; the state that is taken off has none
-        apart = row[0][0].name.endswith("difference")
+        apart = "difference" in row[0][0].name
         offset = columns - len(row) if apart else 0
         axes, images = [], []
         for place, (panel, look) in enumerate(row):
@@ -144,11 +150,14 @@ def _drawn(here: xr.Dataset, rows: list[list[_Look]], inches: float) -> "Figure"
             shown = panel._replace(title=_in_lines(panel.title, _LETTERS * side))
             images.append(draw_disc(axis, shown, look, incidence))
             axes.append(axis)
-        if _alike([panel for panel, _ in row]):
-            colour_bar(figure, axes, images[0], row[0][1])
+        if _shared([panel for panel, _ in row], rows, row[0][1]):
+            # Rows on one scale have the same labels
+            alike = [len(one) for one in rows if one[0][1] is row[0][1]]
+            room = side * min(alike)
+            colour_bar(figure, axes, images[0], row[0][1], min(alike), room)
         else:
             for axis, image, (_, look) in zip(axes, images, row, strict=True):
-                colour_bar(figure, [axis], image, look)
+                colour_bar(figure, [axis], image, look, 1, side)
     return figure
 
 
@@ -163,6 +172,11 @@ def _in_lines(title: str, room: float) -> str:
 def _alike(row: list[Panel]) -> bool:
     """Whether the panels of a row show one element, on one scale."""
     return len(row) > 1 and len({panel.name for panel in row}) == 1
+
+
+def _shared(row: list[Panel], rows: list[list[_Look]], look: Any) -> bool:
+    """Whether a row has one bar: of one scale, or the rest of a row that has."""
+    return _alike(row) or sum(one[0][1] is look for one in rows) > 1
 
 
 def _shared_looks(rows: list[list[Panel]], scale: str) -> list[list[Any]]:

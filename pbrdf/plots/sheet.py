@@ -16,6 +16,7 @@ __all__ = [
     "WIDTHS",
     "beam_of",
     "halo",
+    "in_lines",
     "lay_out",
     "log_ticks",
     "new_figure",
@@ -32,6 +33,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 # One and two columns of a journal [mm]
 WIDTHS = (85.0, 170.0)
 MM = 1 / 25.4
+# So many letters of a title fit on a sheet [1/in]
+_TITLE = 14.0
 # Coordinates that have words of their own in a title, or are the picture's
 _NAMED = (
     "theta_i", "phi_i", "wavelength", "state", "contact_angle", "theta_s", "dphi",
@@ -111,6 +114,21 @@ def halo(colour: str = "white", linewidth: float = 1.8) -> list[Any]:
     from matplotlib import patheffects
 
     return [patheffects.withStroke(linewidth=linewidth, foreground=colour)]
+
+
+def in_lines(words: list[str], inches: float) -> str:
+    """Join the lines of a title, each broken at commas where it is wider than its sheet."""
+    lines = []
+    for line in filter(None, words):
+        lines.append("")
+        for part in line.split(", "):
+            joined = f"{lines[-1]}, {part}" if lines[-1] else part
+            if lines[-1] and len(joined) > _TITLE * inches:
+                lines[-1] += ","
+                lines.append(part)
+            else:
+                lines[-1] = joined
+    return "\n".join(lines)
 
 
 def title_of(result: xr.Dataset) -> str:

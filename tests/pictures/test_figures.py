@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.colors import Normalize, SymLogNorm
 from matplotlib.patches import PathPatch
 from numpy.testing import assert_allclose
 
@@ -15,8 +16,9 @@ from pbrdf.cli.showing.export import model_rows
 from pbrdf.cli.showing.plot import _origin
 from pbrdf.derived.places import choose
 from pbrdf.plots import hemisphere, new_figure, plane_cuts, scan_figure
-from pbrdf.plots.limits import reach_of
+from pbrdf.plots.limits import look_of, reach_of
 from pbrdf.plots.scans import residuals
+from pbrdf.plots.sheet import in_lines
 from tests.pictures.readable import unreadable
 from tests.pictures.results import hand_made
 
@@ -352,15 +354,62 @@ def decades() -> xr.Dataset:
             minus="dry", width_mm=85.0,
         ),
         lambda: hemisphere(decades(), ("M00", "M10"), theta_i=0.3, width_mm=85.0),
+        lambda: hemisphere(
+            states_of(decades().isel(theta_i=0, drop=False)).drop_vars("wavelength"),
+            ("M10",), minus="dry", width_mm=85.0,
+        ),
         lambda: plane_cuts(decades(), ("M10",), width_mm=85.0),
         lambda: plane_cuts(hand_made(), ("M00", "AOLP"), width_mm=85.0),
         lambda: scan_figure(scan((0.3,)), curves_of(0.3), width_mm=85.0),
         lambda: surface_figure(profile(), surface_statistics(profile()), width_mm=85.0),
     ],
-    ids=["states", "decades", "cuts-of-decades", "cuts", "scan", "surface"],
+    ids=[
+        "states", "decades", "states-of-decades", "cuts-of-decades", "cuts", "scan",
+        "surface",
+    ],
 )  # fmt: skip
 def test_every_label_is_readable_as_printed(drawn):
     assert unreadable(drawn()) == []
+
+
+def test_polarisation_and_its_difference_are_drawn_on_even_scales():
+    values = np.array([[0.5, 1e-3, 2e-3, 1e-3, -2e-3]])
+    for name in ("DOLP", "difference of DOLP", "error of DOLP"):
+        norm, _, _ = look_of(name, values, None if "error" in name else 0.01 * abs(values))
+        assert type(norm) is Normalize
+    # While elements have decades
+    assert type(look_of("difference of M10", values, 0.01 * abs(values))[0]) is SymLogNorm
+
+
+def test_a_long_title_is_broken_at_commas():
+    place = "incidence 40°, wavelength not given, folded about the plane"
+    assert in_lines([place], 170 / 25.4) == place
+    assert in_lines([place, "", "note"], 85 / 25.4) == (
+        "incidence 40°, wavelength not given,\nfolded about the plane\nnote"
+    )
+
+
+def test_cuts_mark_their_angles_and_leave_noise_small():
+    result = hand_made(waves=(0.45,), n_theta=18, n_dphi=36)
+    rng = np.random.default_rng(3)
+    result.brdf_total[..., 2, 0] = 1e-4 * rng.normal(size=result.brdf_total.shape[:-2])
+    result.brdf_total[:, :, 4, :, 2, 0] *= 40
+    result.brdf_total_stderr[..., 2, 0] = 1e-4
+    result.brdf_total_stderr[:, :, 4, :, 2, 0] *= 40
+    figure = plane_cuts(result, ("M00", "M10", "M20", "DOLP"))
+    assert "wavelength 0.45 um" in words_of(figure)
+    assert all(axis.get_visible() for axis in figure.axes)
+    assert figure.axes[0].get_subplotspec().get_geometry()[:2] == (2, 2)
+    for axis in figure.axes:
+        angles = {mark: [] for mark in "*+"}
+        for line in axis.lines:
+            if line.get_marker() in angles:
+                angles[line.get_marker()].append(line.get_xdata()[0])
+        assert_allclose(angles["+"], np.rad2deg([0.3, 0.9]))
+        assert_allclose(angles["*"], -np.rad2deg([0.3, 0.9]))
+    # By symmetry zero: no decades of noise
+    assert figure.axes[2].get_yscale() == "linear"
+    assert figure.axes[2].get_ylim()[1] > 2e-4
 
 
 def test_letters_over_letters_and_off_the_sheet_are_seen():
