@@ -62,11 +62,11 @@ _SAID = rf"\s*(?:[:=]|(?:(?:are|is)\s+)?(?:(?:given|measured|stored)\s+)?\bin\b)
 _AXIS_UNIT = re.compile(
     rf"(?<![A-Za-z])({_AXIS}(?:\s*(?:,|and|&)\s*{_AXIS})*)"
     r"(?:[ _-]*(?:units?|values?|data|coordinates?|axis|axes))*"
-    rf"(?:{_SAID}|\s*[\[(]\s*{_NAME}\s*[\])]|_{_NAME}|\s*/\s*{_NAME})(?!\w)",
+    rf"(?:{_SAID}|\s*[\[(]\s*{_NAME}\s*[\])]|_{_NAME}|\s*/\s*{_NAME})(?![\w-])",
     re.IGNORECASE,
 )
 _ALL_UNITS = re.compile(
-    rf"(?:(?:^|[#%,;(])\s*units?|\b(?:lengths|everything|all(?: \w+)?)){_SAID}(?!\w)",
+    rf"(?:(?:^|[#%,;(])\s*units?|\b(?:lengths|everything|all(?: \w+)?)){_SAID}(?![\w-])",
     re.IGNORECASE,
 )
 _UNIT_OF = re.compile(r"\bunits? of (?:the )?", re.IGNORECASE)
@@ -148,8 +148,8 @@ def axis_units(path: str | Path, texts: list[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for text in texts:
         for names, *units in _AXIS_UNIT.findall(_UNIT_OF.sub("", text)):
-            unit = normalise_unit("".join(units))
-            if unit not in LENGTH_UNITS:
+            unit = _said_unit("".join(units))
+            if unit is None:
                 continue
             for name in re.split(r"\s*(?:,|and\b|&)\s*", names.lower()):
                 plane = name.startswith(("xy", "lateral"))
@@ -176,8 +176,14 @@ def height_unit(path: str | Path, texts: list[str]) -> str | None:
 def common_units(texts: list[str]) -> set[str]:
     """Return the units of everything that remarks name: "unit: nm", "all in um"."""
     rest = [_AXIS_UNIT.sub("", _UNIT_OF.sub("", text)) for text in texts]
-    said = (normalise_unit(name) for text in rest for name in _ALL_UNITS.findall(text))
-    return {unit for unit in said if unit in LENGTH_UNITS}
+    said = (_said_unit(name) for text in rest for name in _ALL_UNITS.findall(text))
+    return {unit for unit in said if unit is not None}
+
+
+def _said_unit(name: str) -> str | None:
+    """Return the length unit of a remark; "Data: M 12" is of another kind."""
+    unit = normalise_unit(name)
+    return unit if unit in LENGTH_UNITS and name not in ("M", "PM") else None
 
 
 def _check_one(path: str | Path, what: str, units: set[str]) -> None:

@@ -166,6 +166,17 @@ def test_a_remark_tells_unit_and_step_of_a_matrix(tmp_path, remark):
 
 
 @pytest.mark.parametrize(
+    "remark",
+    ["Data: M 12, at 2 PM", "Data: m-type steel", "lateral unit: nm", "tip radius: 5 nm",
+     "x, y in nm", "heights in a plane", "cut-off (mm): 0.8"],
+)  # fmt: skip
+def test_a_remark_of_something_else_is_no_unit_of_heights(tmp_path, remark):
+    path = write(tmp_path, f"# {remark}\n{matrix_text()}")
+    with pytest.warns(MissingUnitWarning):
+        assert_allclose(read_height_map(path, spacing=(0.5, 0.2)).heights, ROWS.T)
+
+
+@pytest.mark.parametrize(
     ("remarks", "message"),
     [
         ("# height in nm\n# z [um]\n", "one unit of z, the header names nm, um"),
