@@ -20,6 +20,9 @@ _APART = 0.02
 # About the specular direction [deg], and Q/I there that noise and light from below a rough
 # interface do not reach
 _LOBE, _ALONG_P = 10.0, 0.1
+# Along a curve of so many readings, beyond this incidence [rad], polarised light varies by
+# less than this times all light, or this part of it
+_SEVERAL, _OBLIQUE, _MORE, _PLAIN = 5, np.radians(20.0), 1.5, 0.05
 
 
 def check_polarisation(scan: "xr.Dataset") -> list[Finding]:
@@ -73,7 +76,7 @@ def check_polarisation(scan: "xr.Dataset") -> list[Finding]:
                     "--accept polarisation.",
                 )
             )  # fmt: skip
-    return findings + _along_p(scan) + _biased_dolp(scan)
+    return findings + _along_p(scan) + _biased_dolp(scan) + _of_their_own(scan)
 
 
 def _along_p(scan: "xr.Dataset") -> list[Finding]:
@@ -101,9 +104,49 @@ def _along_p(scan: "xr.Dataset") -> list[Finding]:
             f"direction have a median Q/I of {middle:.2g}: polarised along p, where a "
             "surface reflects more of s",
             suspects="s and p exchanged, or Q of the other sign",
-            cure="Exchange the columns, --columns I_s=I_p,I_p=I_s, or the sign of M10.",
+            cure=_exchanged(scan),
         )
     ]  # fmt: skip
+
+
+def _exchanged(scan: "xr.Dataset") -> str:
+    """Return how to exchange s and p, by what the file calls them."""
+    pairs = scan.attrs.get("exchange_s_and_p")
+    if pairs:
+        return f"Exchange the columns, --columns {pairs}."
+    name = "m10" if "m10" in scan else "M10" if "M10" in scan else "s and p"
+    return f"No option does it: change the sign of {name} in the file, if it is that."
+
+
+def _of_their_own(scan: "xr.Dataset") -> list[Finding]:
+    """Note that elements vary more along a curve than all light does: ratios, mostly."""
+    found = brightness(scan)
+    names = [name for name in ("M10", "M01", "M11") if name in scan]
+    if found is None or not names or scan.attrs.get("quantity") == "relative":
+        return []
+    if max(float(np.nanmax(np.abs(scan[name].values), initial=0.0)) for name in names) > 1:
+        return []
+    curve, _ = _curves(scan)
+    for name in names:
+        value, error = np.asarray(scan[name].values, float), stderr_of(scan, name)
+        for k in np.unique(curve):
+            here = (curve == k) & np.isfinite(value) & np.isfinite(found[0])
+            if here.sum() < _SEVERAL or not scan.theta_i.values[here][0] > _OBLIQUE:
+                continue
+            light, noise = found[0][here], _FAR * float(np.nan_to_num(error[here]).max())
+            own, whole = float(np.ptp(value[here])), float(np.ptp(light))
+            if own > _MORE * whole + noise and own > _PLAIN * float(light.max()):
+                at = float(np.degrees(scan.theta_i.values[here][0]))
+                return [
+                    Finding(
+                        name="ratios", severity="note",
+                        what=f"{name} varies by {own:.3g} at incidence {at:.4g} deg, "
+                        f"M00 by {whole:.3g} only",
+                        suspects="elements divided by M00",
+                        cure="Give --normalised if they are.",
+                    )
+                ]  # fmt: skip
+    return []
 
 
 def _errors_of(

@@ -7,6 +7,7 @@ import numpy as np
 
 from fitting.checks.curves import READ_BACK, Curve, brightness, scatter_of, together
 from fitting.checks.finding import Finding
+from fitting.checks.single import REPEATS, check_single
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,11 +16,8 @@ __all__ = [
     "check_limits", "check_missing", "check_noise", "check_repeats", "check_wavelengths",
 ]  # fmt: skip
 
-_REPEATS = 3
 # Darker than any reading [1/sr]
 _LEAST = 1e-150
-# Times both neighbours, and this far from the specular direction [rad]: no lobe
-_SPIKE, _LOBE = 10.0, np.radians(20.0)
 # Below this albedo no diffuse base is as level as a floor
 _NO_BASE = 2e-3
 
@@ -39,7 +37,7 @@ def check_limits(curves: Sequence[Curve]) -> list[Finding]:
                 "fitting.readings.masks, or empty cells.",
             )
         )  # fmt: skip
-    findings += [*_floor(curves), *_spikes(curves)]
+    findings += [*_floor(curves), *check_single(curves)]
     values = np.concatenate([curve.value for curve in curves])
     negative = int((values < 0).sum())
     if negative:
@@ -51,30 +49,6 @@ def check_limits(curves: Sequence[Curve]) -> list[Finding]:
             )
         )  # fmt: skip
     return findings
-
-
-def _spikes(curves: Sequence[Curve]) -> list[Finding]:
-    """Look for single readings far above both neighbours, away from the specular lobe."""
-    found = []
-    for curve in curves:
-        view, value, _ = curve.in_plane()
-        beside = np.maximum(value[:-2], value[2:])
-        away = np.abs(view[1:-1] - curve.theta_i) > _LOBE
-        sharp = (value[1:-1] > _SPIKE * np.maximum(beside, 0.0)) & (beside > 0.0) & away
-        found += [(curve, float(view[k + 1]), k + 1) for k in np.flatnonzero(sharp)]
-    if not found:
-        return []
-    curve, view_at, k = found[0]
-    return [
-        Finding(
-            name="spike", severity="warning",
-            what=f"{len(found)} readings exceed both neighbours over {_SPIKE:g} times, "
-            f"first {curve.in_plane()[1][k]:.4g} at view {np.degrees(view_at):.4g} deg, "
-            f"{curve.place}",
-            suspects="a glint, a mark of a gap, or a slip of the pen",
-            cure="Leave the cell empty if it is no reading.",
-        )
-    ]  # fmt: skip
 
 
 def _floor(curves: Sequence[Curve]) -> list[Finding]:
@@ -132,13 +106,13 @@ def _is_clipped(curve: Curve) -> bool:
     if not count or not top > 1.05 * min(middle, float(curve.value.mean())):
         return False
     _, others = np.unique(curve.value[curve.value < top], return_counts=True)
-    return top > 1.2 * middle or count >= _REPEATS * int(others.max(initial=1))
+    return top > 1.2 * middle or count >= REPEATS * int(others.max(initial=1))
 
 
 def _repeated(curve: Curve, extreme: Callable[[np.ndarray], float]) -> int:
     """Return how often the extreme value occurs, or 0 where that is by chance."""
     count = int((curve.value == extreme(curve.value)).sum())
-    return count if count >= _REPEATS else 0
+    return count if count >= REPEATS else 0
 
 
 def check_noise(curves: Sequence[Curve]) -> list[Finding]:

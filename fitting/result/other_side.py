@@ -80,7 +80,9 @@ def beside_the_other_side(
     least = _OF_CHI2 * result.chi2 if stated else _EACH * len(result.residuals)
     if not rise > max(_RISE, least) or other.misfit.verdict not in ("good", "fair"):
         return result
-    side = "forward" if (np.cos(result.readings.dphi.values) < 0.0).any() else "source's"
+    has_side = result.readings.theta_s.values > _NORMAL
+    forward = np.cos(result.readings.dphi.values[has_side]) < 0.0
+    side = "forward" if forward.any() else "source's"
     if stated:
         text = f"chi2 falls by {2.0 * rise:.3g} of {result.chi2:.3g}"
     else:

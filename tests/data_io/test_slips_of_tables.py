@@ -8,10 +8,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from data_io import ConventionWarning, read_goniometer
+from fitting import check_scan
 from pbrdf.errors import DataFileError
 
 ANGLES = "theta_i_deg,theta_view_deg"
-VIEWS = (-60, -30, 0, 20, 30, 40, 60)
+VIEWS = (-60, -30, 0, 22, 30, 38, 60)
 # A lobe at 30 degrees over a base
 LIGHT = np.array([0.032, 0.033, 0.04, 0.09, 0.12, 0.10, 0.045])
 
@@ -116,3 +117,66 @@ def test_a_turn_may_end_where_it_began(tmp_path):
     path.write_text(path.read_text().replace(",360,", ",0,"))
     with pytest.raises(DataFileError, match="one value a geometry"):
         read(path)
+
+
+def found(scan, name):
+    return [one for one in check_scan(scan) if one.name == name]
+
+
+def test_single_zeros_beside_light_are_found(tmp_path):
+    gap = LIGHT.copy()
+    gap[0] = 0.0
+    (one,) = found(read(write(tmp_path, BRDF=gap)), "floor")
+    assert one.severity == "warning"
+    assert "1 readings are exactly 0" in one.what
+    assert "view -60 deg beside 0.033" in one.what
+    # In the dark of a mirror a rounded 0 is a reading
+    dark = [0.0, 1e-4, 1e-3, 0.2, 9.0, 0.3, 1e-3]
+    assert not found(read(write(tmp_path, BRDF=dark)), "floor")
+
+
+def test_ratios_beside_bright_light_are_noted(tmp_path):
+    """On a base of albedo 0.8 no ratio exceeds M00; it varies more than M00."""
+    lobe = 0.3 * (LIGHT - LIGHT.min())
+    light, polarised = 0.255 + lobe, lobe * np.linspace(0.0, 0.9, 7)
+    scan = read(write(tmp_path, M00=light, M10=polarised / light))
+    (one,) = found(scan, "ratios")
+    assert one.severity == "note"
+    assert "--normalised" in one.cure
+    assert not found(read(write(tmp_path, M00=light, M10=polarised)), "ratios")
+    path = write(tmp_path, M00=light, M10=polarised / light)
+    scan = read(path, normalised=True)
+    assert "m10" in scan
+    assert not found(scan, "ratios")
+
+
+@pytest.mark.parametrize("names", [("I_s", "I_p"), ("Is", "Ip"), ("I0", "I90"), ("a", "b")])
+def test_s_and_p_are_exchanged_by_the_names_of_the_file(tmp_path, names):
+    one, other = 0.2 * LIGHT, 0.8 * LIGHT
+    path = write(tmp_path, **dict(zip(names, (one, other), strict=True)))
+    columns = {"a": "I_s", "b": "I_p"} if names[0] == "a" else {}
+    (finding,) = found(read(path, columns=columns), "s-and-p")
+    pairs = finding.cure.removesuffix(".").partition("--columns ")[2]
+    scan = read(path, columns=dict(pair.split("=") for pair in pairs.split(",")))
+    assert_allclose(scan.I_s, other)
+    assert not found(scan, "s-and-p")
+
+
+def test_four_polarisers_exchange_two(tmp_path):
+    path = write(
+        tmp_path, I0=0.2 * LIGHT, I45=0.5 * LIGHT, I90=0.8 * LIGHT, I135=0.5 * LIGHT
+    )
+    (finding,) = found(read(path), "s-and-p")
+    assert "--columns I0=I90,I90=I0." in finding.cure
+    assert not found(read(path, columns={"I0": "I90", "I90": "I0"}), "s-and-p")
+    path = write(tmp_path, M00=LIGHT, M10=-0.6 * LIGHT)
+    (finding,) = found(read(path), "s-and-p")
+    assert "--columns" not in finding.cure
+
+
+def test_expanded_uncertainties_are_no_standard_errors(tmp_path):
+    path = write(tmp_path, **{"BRDF": LIGHT, "U (k=2)": 0.001})
+    with pytest.raises(DataFileError, match="expanded one, k=2"):
+        read(path, columns={"U (k=2)": "M00_stderr"})
+    path = write(tmp_path, **{"BRDF": LIGHT, "u (k=1)": 0.001})
+    assert "M00_stderr" in read(path, columns={"u (k=1)": "M00_stderr"})

@@ -71,3 +71,15 @@ def test_a_lobe_on_the_side_of_the_source_is_an_error_of_physics(tmp_path, capsy
     assert main(["check", str(tmp_path / "scan.csv"), *words]) == 1
     assert main(["check", str(tmp_path / "scan.csv")]) == 0
     assert "[exchanged]" in capsys.readouterr().out
+
+
+def test_a_reading_along_the_normal_has_no_side():
+    right, _, model = one_side(-1)
+    normal = right.theta_s < 1e-9
+    # As signed views of 0 are read
+    right = right.assign_coords(dphi=np.where(normal, np.pi, right.dphi) + 0 * right.dphi)
+    turned = right.assign_coords(dphi=np.mod(right.dphi + np.pi, 2 * np.pi))
+    assert "forward side, and" in fit(turned, model).warnings[0]
+    wrong, _, _ = one_side(1)
+    wrong = wrong.assign_coords(dphi=np.where(normal, np.pi, 0.0) + 0 * wrong.dphi)
+    assert "all readings lie on the source's side" in fit(wrong, model).warnings[0]

@@ -109,6 +109,7 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
             "title": kept[0] if kept else "",
             "comments": "\n".join(kept),
             **_between_polarisers(columns),
+            **_exchange(columns),
             **({"left_out": columns.left_out} if columns.left_out else {}),
         },
     )
@@ -147,6 +148,24 @@ def _between_polarisers(columns: Columns) -> dict[str, float]:
     one, other = light["I0"] + light["I90"], light["I45"] + light["I135"]
     with np.errstate(invalid="ignore", divide="ignore"):
         return {"polarisers_apart": float(np.nanmedian(2 * (other - one) / (one + other)))}
+
+
+def _exchange(columns: Columns) -> dict[str, str]:
+    """Return the mapping that exchanges light along s and p, errors with it."""
+    if len(set(columns.lines)) < len(columns.lines):
+        # Columns of single wavelengths
+        return {}
+    for one, other in (("I_s", "I_p"), ("I0", "I90")):
+        if not {one, other} <= columns.values.keys():
+            continue
+        pairs = [
+            f"{columns.names[name + end]}={to}{end}"
+            for end in ("", STDERR)
+            for name, to in ((one, other), (other, one))
+            if name + end in columns.values
+        ]
+        return {"exchange_s_and_p": ",".join(pairs)}
+    return {}
 
 
 def _require_all_errors(path: Path, values: Mapping[str, np.ndarray], line: int) -> None:

@@ -26,6 +26,10 @@ _PER_CENT_CURE = (
 )
 
 
+# The coverage factor of an expanded uncertainty, but for k = 1
+_EXPANDED = re.compile(r"(?<![A-Za-z])k ?= ?(?!1(?:\.0*)?(?![.\d]))\d[\d.]*")
+
+
 def declared_name(name: str, columns: Mapping[str, str]) -> str | None:
     """Return the name under which a mapping knows a column, as it stands or without units.
 
@@ -50,6 +54,11 @@ def honoured(path: Path, table: RawTable, name: str, key: str, said: Declared) -
     target = said.columns[key]
     meaning = target_of(target) or Meaning(IGNORE)
     units = [unit for unit in written_units(name).units if unit != "1"]
+    expanded = meaning.stderr and _EXPANDED.search(name)
+    if expanded:
+        problem = f"expected a standard error, got an expanded one, {expanded[0]}"
+        cure = "Divide it by its coverage factor, and name the column without it."
+        raise DataFileError(path, problem, cure, line=table.header, column=name)
     if meaning.name == IGNORE or not units:
         return meaning
     problem = f"expected {target}, as it is declared, the file writes {_listed(units)}"
