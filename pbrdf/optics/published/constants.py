@@ -13,6 +13,7 @@ from pbrdf.errors import AccuracyWarning, DataFileError
 from pbrdf.optics.dispersion import Dispersion, Table
 from pbrdf.optics.materials import Material
 from pbrdf.optics.published.database import read_database_entry
+from pbrdf.optics.published.definitions import require_one_state
 from pbrdf.optics.published.package import PREFIX, read_by_name
 from pbrdf.optics.published.tables import IGNORED, Block, read_blocks
 from pbrdf.optics.published.text import read_text
@@ -193,6 +194,8 @@ def _constants(path: Path, block: Block) -> dict[str, Table]:
         for role in ("n", "kappa", "eps1", "eps2", "diffuse_albedo")
         if (values := block.values(role)) is not None
     }
+    left_out = {name: [cells[k] for k in order] for name, cells in block.left_out.items()}
+    require_one_state(path, left_out, block.lines, columns)
     if "eps1" in columns:
         if "n" in columns or "kappa" in columns:
             problem = "expected n and kappa or eps1 and eps2, got both"

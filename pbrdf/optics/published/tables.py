@@ -7,6 +7,12 @@ from pathlib import Path
 
 from pbrdf.errors import DataFileError
 from pbrdf.optics.published.columns import Column, column_of, unit_of
+from pbrdf.optics.published.definitions import (
+    is_unit_of_number,
+    refuse_attenuation_index,
+    refuse_units,
+    with_unit,
+)
 from pbrdf.optics.published.text import Line, cells_of, number, separator_of
 
 __all__ = ["Block", "read_blocks"]
@@ -18,6 +24,8 @@ _CURE = (
     "out, --material-ignore NAME, ignore=['NAME'], or ignore = ['NAME'] in a scene. "
     "Remarks begin with #."
 )
+# First line of a spreadsheet's export
+_SEPARATOR = re.compile(r'"?sep=.?"?', re.IGNORECASE)
 # What a column holds that is left out
 IGNORED = "ignored"
 # Third line of the text format of ellipsometry programs
@@ -27,11 +35,12 @@ _KINDS = {"nk": ("n", "kappa"), "e1e2": ("eps1", "eps2"), "eps": ("eps1", "eps2"
 
 @dataclass
 class Block:
-    """Rows of numbers under one header."""
+    """Rows of numbers under one header, and the cells of columns that are left out."""
 
     columns: list[Column]
     lines: list[int] = field(default_factory=list)
     rows: list[list[float]] = field(default_factory=list)
+    left_out: dict[str, list[str]] = field(default_factory=dict)
 
     def values(self, role: str) -> list[float] | None:
         """Return a column by what it means, or None."""
@@ -58,6 +67,8 @@ def read_blocks(path: Path, text: str, ignore: Sequence[str] = ()) -> list[Block
     lines = [Line(k, s.strip()) for k, s in enumerate(text.split("\n"), start=1)]
     # Spreadsheets leave rows of separators
     lines = [line for line in lines if line.text.strip(",;\t ")]
+    if lines and _SEPARATOR.fullmatch(lines[0].text):
+        lines = lines[1:]
     content = [line for line in lines if not line.text.startswith(_COMMENT)]
     comments = [line for line in lines if line.text.startswith(_COMMENT)]
     if not content:
@@ -74,6 +85,8 @@ def read_blocks(path: Path, text: str, ignore: Sequence[str] = ()) -> list[Block
     if nameless:
         return [_rows(path, Block(_nk_columns(path, comments)), content)]
     blocks = _headed(path, content, comments, ignore)
+    if any(column.role == "kappa" for block in blocks for column in block.columns):
+        refuse_attenuation_index(path, comments)
     names = {_bare(column.name) for block in blocks for column in block.columns}
     absent = [name for name in ignore if name not in names]
     if absent:
@@ -127,9 +140,10 @@ def _is_row(line: Line) -> bool:
 def _is_units(line: Line) -> bool:
     """Tell whether a line names the units of the columns above it."""
     cells = cells_of(line.text, separator_of(line.text))
-    others = [cell for cell in cells if unit_of(cell) is None]
-    return len(others) < len(cells) and all(
-        cell == "1" or (number(cell) is None and column_of(cell) is None) for cell in others
+    units = [bool(unit_of(cell)) or is_unit_of_number(cell) for cell in cells]
+    return (any(units) or {*cells} <= {"", "-", "1"}) and all(
+        unit or cell == "1" or (number(cell) is None and column_of(cell) is None)
+        for cell, unit in zip(cells, units, strict=True)
     )
 
 
@@ -148,8 +162,11 @@ def _columns(
     if units is not None:
         below = cells_of(units.text, separator_of(units.text))
         below += [""] * (len(cells) - len(below))
+        refuse_units(
+            path, [c if _bare(c) not in ignore else "" for c in cells], units, below
+        )
         pairs = zip(cells, below, strict=False)
-        cells = [_with_unit(name, unit) for name, unit in pairs]
+        cells = [with_unit(name, unit) for name, unit in pairs]
     found = [
         # A first column without a name counts the rows, as in tables of pandas
         Column(cell, IGNORED)
@@ -182,14 +199,6 @@ def _columns(
     return columns
 
 
-def _with_unit(name: str, below: str) -> str:
-    """Return a name with the unit below it, unless it names the same one itself."""
-    unit, own = unit_of(below), column_of(name)
-    if unit is None or (own is not None and own.unit == unit):
-        return name
-    return f"{name} [{below.strip('[]()')}]"
-
-
 def _rows(
     path: Path, block: Block, content: Sequence[Line], header: Line | None = None
 ) -> Block:
@@ -213,6 +222,7 @@ def _rows(
             cell = cells[k] if k < len(cells) else ""
             if column.role == IGNORED:
                 row.append(float("nan"))
+                block.left_out.setdefault(column.name, []).append(cell)
                 continue
             value = number(cell)
             if value is None or not _allowed(column.role, value):
