@@ -103,6 +103,7 @@ def test_a_mapping_that_contradicts_a_unit_is_refused(tmp_path, head, row, colum
 @pytest.mark.parametrize(
     ("head", "row", "columns"),
     [
+        ("AOI [steps],theta_view_deg,BRDF", "30,20,.1", {"AOI": "theta_i_deg"}),
         ("AOI [gon],theta_view_deg,BRDF", "30,20,.1", {"AOI": "theta_i_deg"}),
         (told("BRDF,half angle [mrad]"), "30,20,.1,9", {"half angle": "detector_half_angle_deg"}),
         (told("BRDF,err [%]"), "30,20,.03,2", {"err": "M00_stderr"}),
@@ -113,7 +114,7 @@ def test_a_mapping_that_contradicts_a_unit_is_refused(tmp_path, head, row, colum
     ],
 )  # fmt: skip
 def test_a_unit_that_cannot_be_honoured_is_refused(tmp_path, head, row, columns):
-    with pytest.raises(DataFileError, match=r"gon|mrad|standard error|per cent|%"):
+    with pytest.raises(DataFileError, match=r"gon|steps|mrad|standard error|per cent|%"):
         read(tmp_path, head, [row], columns=columns)
 
 
@@ -158,3 +159,33 @@ def test_constants_may_repeat_their_unit_below(tmp_path):
     path.write_text("wavelength_nm,n,k\num,-,-\n400,1.6,.1\n800,1.5,.2\n")
     with pytest.raises(DataFileError, match=r"wavelength_nm \[um\]"):
         materials.read(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("BRDF [per sr]", 0.5),
+        ("BRDF [sr\u22121]", 0.5),
+        ("BRDF (1 / steradian)", 0.5),
+        ("BRF [percent]", 0.005 / np.pi),
+        ("BRF (per cent)", 0.005 / np.pi),
+    ],
+)
+def test_units_may_be_spelled(tmp_path, name, expected):
+    assert_allclose(read(tmp_path, told(name), ["30,20,.5"]).M00, expected)
+
+
+def test_per_cent_of_m00_is_a_ratio(tmp_path):
+    row = ["30,20,.1,40"]
+    with pytest.raises(DataFileError, match="of M00, --columns M10=m10") as refused:
+        read(tmp_path, told("M00,M10 [%]"), row)
+    (mapping, _) = next(options(str(refused.value)))
+    assert_allclose(read(tmp_path, told("M00,M10 [%]"), row, columns=mapping).m10, 0.4)
+
+
+def test_any_unit_is_taken_where_the_scale_is_unknown(tmp_path):
+    with pytest.raises(DataFileError, match="BRDF=M00 with --quantity relative") as refused:
+        read(tmp_path, told("BRDF [a.u.]"))
+    mapping, quantity = next(options(str(refused.value)))
+    scan = read(tmp_path, told("BRDF [a.u.]"), columns=mapping, quantity=quantity)
+    assert_allclose(scan.M00, [0.32, 1.2])

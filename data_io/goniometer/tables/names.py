@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 
 from data_io.goniometer.scan import QUANTITIES, STDERR
-from data_io.goniometer.tables.units import ANGLE_UNITS
+from data_io.goniometer.tables.units import ANGLE_UNITS, unit_named
 from pbrdf.optics.published.columns import column_of, unit_of
 
 __all__ = [
@@ -56,7 +56,6 @@ _DIVIDED = re.compile(r"^[Mm](\d\d)\s*/\s*[Mm]00$|^[Mm](\d\d)_norm(?:alised|aliz
 _AT_WAVELENGTH = re.compile(
     r"^(?:(.+?)[\s_@]+)?(\d+(?:\.\d+)?)\s*(nm|um|µm)$", re.IGNORECASE
 )
-_VALUE_UNITS = {"", "-", "1", "1/sr", "sr-1", "sr^-1", "sr⁻¹", "/sr", "%"}
 
 
 @dataclass(frozen=True)
@@ -156,7 +155,8 @@ def _angle(plain: str, bracket: str) -> Meaning | None:
 def _value(plain: str, bracket: str) -> Meaning | None:
     stderr = plain.endswith(STDERR)
     name = plain.removesuffix(STDERR)
-    if bracket not in _VALUE_UNITS:
+    unit = unit_named(bracket)
+    if unit not in ("1", "1/sr", "%"):
         return None
     divided = _DIVIDED.match(name)
     if divided:
@@ -165,9 +165,9 @@ def _value(plain: str, bracket: str) -> Meaning | None:
     known = name if name in VALUES else _SAME_VALUE.get(re.sub(r"\s+", "_", name.lower()))
     # BRF [1/sr] is pi times a BRDF by its name, a BRDF by its unit
     without_unit = known in ("reflectance-factor", "DOLP") or str(known).startswith("m")
-    if known is None or ("sr" in bracket and without_unit and known != "m00"):
+    if known is None or (unit == "1/sr" and without_unit and known != "m00"):
         return None
-    return Meaning(known, "%" if bracket == "%" else None, stderr)
+    return Meaning(known, "%" if unit == "%" else None, stderr)
 
 
 def _is_spectral(name: str, unit: str | None) -> bool:

@@ -76,7 +76,8 @@ def honoured(path: Path, table: RawTable, name: str, key: str, said: Declared) -
     if units == ["%"] or (said.quantity == "relative" and meaning.name not in RATIOS):
         return replace(meaning, unit=units[0])
     cure = (
-        "Convert it to 1/sr, per cent or parts of 1; readings without an absolute scale "
+        "Convert it to 1/sr, per cent or parts of 1 (what is no unit, take out of the "
+        "header); readings without an absolute scale "
         f"are --columns {key}={target} with --quantity relative."
     )
     if meaning.name in RATIOS:

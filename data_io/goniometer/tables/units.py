@@ -12,7 +12,7 @@ ANGLE_UNITS = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
 }
 _PER_CENT = ("%", "percent", "per cent", "pct")
-_PER_SR = ("1/sr", "sr-1", "sr^-1", "sr⁻¹", "/sr")
+_PER_SR = re.compile(r"(?:1?/|per)(?:sr|steradians?)|sr(?:\^|\*\*)?[-\u2212]1|sr⁻¹")
 _BRACKET = re.compile(r"^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$")
 # What may stand behind a name without brackets and is nothing but a unit
 _BEHIND = re.compile(
@@ -22,7 +22,7 @@ _BEHIND = re.compile(
     re.IGNORECASE,
 )
 _BASE = (
-    r"sr|rad|deg|gon|grad|arcmin|arcsec|eV|Hz|W|V|A|J|K|m|s|g|cts?|counts?|ppm|dB|bits?|"
+    r"sr|rads?|deg|gons?|grad(?:ian)?s?|arcmin|arcsec|eV|Hz|W|V|A|J|K|m|s|g|cts?|counts?|ppm|dB|bits?|"
     r"px|a\.?u\.?|arb\.?(?: ?u(?:nits?)?\.?)?|inch|in|mil|°|%|‰|lm|lx|cd|rel\.?|relative"
 )
 _POWER = r"(?:\^?[-+\u2212⁻]?[\d⁰¹²³⁴]+|[⁻¹²³]+)?"
@@ -60,7 +60,7 @@ def unit_named(text: str) -> str | None:
         return "1"
     if key in _PER_CENT:
         return "%"
-    if key in _PER_SR:
+    if _PER_SR.fullmatch(key.replace(" ", "")):
         return "1/sr"
     if key in _NO_UNIT:
         return None
@@ -81,8 +81,9 @@ def written_units(name: str) -> Written:
     units = []
     while (found := _BRACKET.match(name.strip())) and found[1]:
         unit = unit_named(found[2])
-        if unit is None:
+        if unit is None and not _is_unit_by_place(name, found[2]):
             break
+        unit = unit or found[2]
         units.append(unit)
         name = found[1]
     behind = _BEHIND.match(name.strip())
@@ -91,6 +92,16 @@ def written_units(name: str) -> Written:
         units.append(unit_named(unit) or unit)
         name = behind[1] or behind[3]
     return Written(name.strip(), tuple(dict.fromkeys(units)))
+
+
+def _is_unit_by_place(name: str, text: str) -> bool:
+    """Tell whether a word in square brackets is a unit that nobody knows.
+
+    >>> _is_unit_by_place("AOI [steps]", "steps"), _is_unit_by_place("u(BRDF)", "BRDF")
+    (True, False)
+    """
+    word = text.lower() not in _NO_UNIT and not re.search(r"\d\s*(?:nm|[uµμ]m)$|=", text)
+    return word and name.rstrip().endswith("]")
 
 
 def bare_name(name: str) -> str:
@@ -102,7 +113,7 @@ def bare_name(name: str) -> str:
     ('M00', '[deg]', 'u(BRDF)')
     """
     while (found := _BRACKET.match(name.strip())) and found[1]:
-        if unit_named(found[2]) is None:
+        if unit_named(found[2]) is None and not _is_unit_by_place(name, found[2]):
             break
         name = found[1]
     return name
