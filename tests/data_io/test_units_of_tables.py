@@ -183,9 +183,31 @@ def test_per_cent_of_m00_is_a_ratio(tmp_path):
     assert_allclose(read(tmp_path, told("M00,M10 [%]"), row, columns=mapping).m10, 0.4)
 
 
-def test_any_unit_is_taken_where_the_scale_is_unknown(tmp_path):
+@pytest.mark.parametrize("unit", ["a.u.", "1/msr", "1e-3/sr", "counts"])
+def test_any_unit_is_taken_where_the_scale_is_unknown(tmp_path, unit):
+    head = told(f"BRDF [{unit}]")
     with pytest.raises(DataFileError, match="BRDF=M00 with --quantity relative") as refused:
-        read(tmp_path, told("BRDF [a.u.]"))
+        read(tmp_path, head)
     mapping, quantity = next(options(str(refused.value)))
-    scan = read(tmp_path, told("BRDF [a.u.]"), columns=mapping, quantity=quantity)
+    scan = read(tmp_path, head, columns=mapping, quantity=quantity)
     assert_allclose(scan.M00, [0.32, 1.2])
+
+
+@pytest.mark.parametrize("columns", [{}, {"BRDF": "M00"}])
+def test_logarithms_have_no_scale_to_be_free_of(tmp_path, columns):
+    with pytest.raises(DataFileError, match="write the numbers themselves"):
+        read(tmp_path, told("BRDF [dB]"), columns=columns, quantity="relative")
+
+
+@pytest.mark.parametrize("columns", [{}, {"M00": "M00"}])
+def test_values_have_one_unit(tmp_path, columns):
+    with pytest.raises(DataFileError, match=r"writes \[%\] and \[1/sr\]"):
+        read(tmp_path, told("M00 [1/sr]") + "\ndeg,deg,%", columns=columns, quantity=FACTOR)
+
+
+def test_errors_keep_their_name_in_a_cure(tmp_path):
+    head, row = told("BRDF,BRF_stderr [1/sr]"), ["30,20,.1,.01"]
+    with pytest.raises(DataFileError, match="BRF_stderr=M00_stderr with --quantity brdf"):
+        read(tmp_path, head, row)
+    scan = read(tmp_path, head, row, columns={"BRF_stderr": "M00_stderr"}, quantity="brdf")
+    assert_allclose(scan.M00_stderr, 0.01)

@@ -12,7 +12,7 @@ from data_io.goniometer.declarations import Declared
 from data_io.goniometer.scan import RATIOS, STDERR, ConventionWarning
 from data_io.goniometer.tables.names import ANGLES, IGNORE, Meaning, target_of
 from data_io.goniometer.tables.table import RawTable
-from data_io.goniometer.tables.units import bare_name, written_units
+from data_io.goniometer.tables.units import bare_name, is_logarithm, written_units
 from pbrdf.errors import DataFileError
 
 __all__ = [
@@ -68,20 +68,22 @@ def honoured(path: Path, table: RawTable, name: str, key: str, said: Declared) -
             return meaning
         cure = _unit_cure(key, meaning, units)
         raise DataFileError(path, problem, cure, line=table.header, column=name)
-    units = [unit for unit in units if unit != "1/sr"] or units
-    if len(units) > 1:
-        require_agreement(path, table, name, meaning)
+    require_agreement(path, table, name, meaning)
     if units == ["1/sr"]:
         return meaning
-    if units == ["%"] or (said.quantity == "relative" and meaning.name not in RATIOS):
+    log = is_logarithm(units[0])
+    free = said.quantity == "relative" and meaning.name not in RATIOS and not log
+    if units == ["%"] or free:
         return replace(meaning, unit=units[0])
     cure = (
         "Convert it to 1/sr, per cent or parts of 1 (what is no unit, take out of the "
         "header); readings without an absolute scale "
         f"are --columns {key}={target} with --quantity relative."
     )
-    if meaning.name in RATIOS:
-        cure = "Convert it to parts of 1 or per cent."
+    if meaning.name in RATIOS or log:
+        cure = "Of logarithms write the numbers themselves." if log else (
+            "Convert it to parts of 1 or per cent."
+        )  # fmt: skip
     raise DataFileError(path, problem, cure, line=table.header, column=name)
 
 

@@ -5,7 +5,14 @@ from typing import NamedTuple
 
 from pbrdf.optics.published.columns import unit_of
 
-__all__ = ["ANGLE_UNITS", "Written", "bare_name", "unit_named", "written_units"]
+__all__ = [
+    "ANGLE_UNITS",
+    "Written",
+    "bare_name",
+    "is_logarithm",
+    "unit_named",
+    "written_units",
+]
 
 ANGLE_UNITS = {
     **dict.fromkeys(("deg", "degree", "degrees", "°", "º"), "deg"),
@@ -92,6 +99,15 @@ def written_units(name: str) -> Written:
         units.append(unit_named(unit) or unit)
         name = behind[1] or behind[3]
     return Written(name.strip(), tuple(dict.fromkeys(units)))
+
+
+def is_logarithm(unit: str) -> bool:
+    """Tell whether a unit is one of logarithms, whose numbers are no multiples.
+
+    >>> is_logarithm("dB"), is_logarithm("log10(1/sr)"), is_logarithm("lm")
+    (True, True, False)
+    """
+    return unit.lower().startswith(("db", "log", "lg", "ln"))
 
 
 def _is_unit_by_place(name: str, text: str) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 from data_io.goniometer.scan import STDERR
 from data_io.goniometer.tables.names import ANGLES, TARGETS, meaning_of
 from data_io.goniometer.tables.table import RawTable
-from data_io.goniometer.tables.units import bare_name
+from data_io.goniometer.tables.units import bare_name, is_logarithm, written_units
 from pbrdf.errors import DataFileError
 from pbrdf.optics.published.columns import column_of
 
@@ -137,14 +137,19 @@ def _of_unit(name: str) -> str:
     if meaning.name == "wavelength":
         return f"{name} is in no unit of wavelengths that is known: convert it."
     error = STDERR if meaning.stderr else ""
-    if "sr" in name.removeprefix(bare):
-        cure = f"--columns {bare}={meaning.name} or {bare}=M00 with --quantity brdf"
+    unit = written_units(name).units[0]
+    if is_logarithm(unit):
+        return f"{name} holds logarithms: write the numbers themselves."
+    if unit == "1/sr":
+        target = "M00"
         if meaning.name.startswith("m"):
-            cure = f"--columns {bare}={meaning.name} or {bare}={meaning.name.upper()}"
+            target = meaning.name.upper()
+        cure = f"--columns {bare}={meaning.name}{error} or {bare}={target}{error}"
+        cure += " with --quantity brdf" if target == "M00" else ""
         return f"{name} has no unit by its name, and that of a BRDF behind it: give {cure}."
     return (
         f"{name} is not in 1/sr: give --columns {bare}={meaning.name}{error} with "
-        "--quantity relative, or what it is."
+        "--quantity relative, or convert it."
     )
 
 
