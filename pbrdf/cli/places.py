@@ -19,8 +19,17 @@ _OPTIONS = {
 _DRAWN = ("theta_s", "dphi", "stokes_out", "stokes_in")
 
 
-def written_places(texts: list[str] | None) -> dict[str, Any]:
+def written_places(
+    texts: list[str] | None, cure: str = "Give --theta-i-deg."
+) -> dict[str, Any]:
     """Return the places of --at: numbers, or text where it is none; phi_i in radians.
+
+    Parameters
+    ----------
+    texts : list of str, optional
+        As NAME=VALUE.
+    cure : str
+        What to do instead of naming the incidence.
 
     Raises
     ------
@@ -32,10 +41,7 @@ def written_places(texts: list[str] | None) -> dict[str, Any]:
         name, equals, value = (part.strip() for part in text.partition("="))
         name = "wavelength" if name == "wavelength_um" else name
         if name in ("theta_i", "theta_i_deg"):
-            msg = (
-                f"--at must not name the incidence, got {name} of value {value}. Give "
-                "--theta-i-deg."
-            )
+            msg = f"--at must not name the incidence, got {name} of value {value}. {cure}"
             raise ValueError(msg)
         if name == "phi_i":
             msg = f"--at must name the azimuth in degrees, phi_i_deg=VALUE, got {text!r}."

@@ -204,11 +204,12 @@ def read_store(
     wavelength: float | None = None,
     theta_i: float | None = None,
     interpolated: bool = True,
+    cure: str = "Give --theta-i-deg.",
 ) -> "xr.Dataset":
     """Interpolate the store of a sweep at NAME=VALUE of each thing that varied.
 
     Values are in the units of the store's names; those of text are taken as text. Errors
-    hold that of interpolation if `interpolated`.
+    hold that of interpolation if `interpolated`; `cure` as of `written_places`.
 
     Raises
     ------
@@ -218,7 +219,7 @@ def read_store(
     from pbrdf import from_store
     from pbrdf.cli.places import written_places
 
-    places = written_places(at)
+    places = written_places(at, cure)
     if "wavelength" in places:
         if wavelength is not None:
             msg = "--wavelength-um must be given once, got it in --at too. Leave one out."

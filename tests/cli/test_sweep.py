@@ -144,3 +144,19 @@ def test_several_materials_keep_their_surface_sweep(tmp_path: Path) -> None:
         sweep_of(document, source, {"n": [1.5]}, {})
     one = sweep_of(document, source, {"substrate.materials[1].material": ["pvc"]}, {})
     assert [m.name for m in one.at({"material": 0})[0].substrate] == ["pvc", "pvc"]
+
+
+def test_the_incidence_of_a_store_has_no_second_name(
+    folder: Path, capsys: pytest.CaptureFixture
+) -> None:
+    words = ["sweep", "scene.toml", "--vary", "n=1.4,1.6", *QUICK, "-o", "s.zarr"]
+    assert main(words) == 0
+    capsys.readouterr()
+    for command, target, cure in (
+        ("plot", "s.png", "Give --theta-i-deg."),
+        ("export", "s.csv", "Leave it out, all of the store are written."),
+    ):
+        at = ["--at", "n=1.5", "--at", "theta_i_deg=30"]
+        assert main([command, "s.zarr", *at, "-o", target]) == 2
+        told = capsys.readouterr().err
+        assert f"must not name the incidence, got theta_i_deg of value 30. {cure}" in told

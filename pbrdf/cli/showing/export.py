@@ -152,7 +152,8 @@ def _result(source: Path, at: list[str] | None, wavelength: float | None) -> "xr
     if source.suffix == ".zarr" and not data_io.is_result_store(source):
         from pbrdf.cli.reading import read_store
 
-        return read_store(source, at, wavelength=wavelength)
+        cure = "Leave it out, all of the store are written."
+        return read_store(source, at, wavelength=wavelength, cure=cure)
     return data_io.read_result(source)
 
 
