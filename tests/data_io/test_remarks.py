@@ -164,7 +164,7 @@ def test_other_remarks_change_nothing(tmp_path, remark):
     assert_allclose(scan.M00, [0.032, 0.033, 0.09, 0.12])
 
 
-@pytest.mark.parametrize("one", ["wavelength 450", "black paint, 650 nm"])
+@pytest.mark.parametrize("one", ["wavelength 450", "black paint, 650 nm", "chassis 650 nm"])
 def test_a_doubtful_wavelength_is_named_with_what_is_understood(tmp_path, one):
     (tmp_path / "s.csv").write_text(f"# {one}\n{HEAD}{ROWS}")
     with pytest.warns(ConventionWarning, match="is left out: write wavelength 6") as caught:
@@ -231,7 +231,7 @@ def test_polarised_readings_are_not_of_unpolarised_light(tmp_path, remark, end):
     [
         ("wavelength = 450", "wavelength = 650", "wavelength"), ("lambda: 450", "lambda: 650", "wavelength"),
         ("lambda=0.45", "lambda=0.65", "wavelength"), ("2.75 eV", "1.9 eV", "wavelength"),
-        ("4500 A", "6500 A", "wavelength"), ("15800 cm-1", "9400 cm-1", "wavelength"),
+        ("4500 A", "6500 A", "wavelength"), ("15800 cm-1", "9400 cm-1", "wavelength"), ("HeNe", "Nd:YAG laser", "wavelength"),
         ("polarizer 0", "polarizer 90", "polarisation"), ("TE", "TM", "polarisation"),
         ("parallel", "perpendicular", "polarisation"), ("co-pol", "cross-pol", "polarisation"),
         ("azimuth 0 deg", "azimuth 90 deg", "azimuth of the sample"), ("gain x10", "gain x1", "gain"),
@@ -245,6 +245,32 @@ def test_two_settings_among_the_rows_are_refused(tmp_path, first, second, what):
     # Each setting a file
     for part in (f"{HEAD}{BACK}", f"{HEAD}{FORE}"):
         read(tmp_path, part)
+
+
+def test_settings_that_columns_hold_may_head_blocks(tmp_path):
+    """Azimuths of the detector, sides of the sample, and one quantity in every block."""
+    blocks = (("azimuth 0 deg", "0"), ("azimuth 90 deg", "90"))
+    for column, remarks in (
+        ("dphi_deg", blocks),
+        ("phi_i_deg", (("parallel", "0"), ("perpendicular", "90"))),
+    ):
+        angles = "theta_s_deg" if column == "dphi_deg" else "theta_view_deg"
+        text = f"theta_i_deg,{angles},{column},M00\n"
+        for remark, value in remarks:
+            text += f"# {remark}\n30,20,{value},0.05\n30,40,{value},0.04\n"
+        assert read(tmp_path, text).sizes["geometry"] == 4
+    block = "# quantity: BRF [%]\n"
+    scan = read(
+        tmp_path, f"{block}{HEAD}30,20,9\n30,30,12\n{block}{HEAD}30,40,8\n30,50,6\n"
+    )
+    assert_allclose(scan.M00[-1], 0.06 / np.pi)
+    text = f"{HEAD}{BACK}# BRF\n{FORE}"
+    message = refused(tmp_path, text)
+    cure = re.search(r"write (# quantity: [a-z-]+) above", message)[1]
+    assert_allclose(read(tmp_path, f"{cure}\n{HEAD}{BACK}{FORE}").M00[0], 0.032 / np.pi)
+    assert_allclose(
+        read(tmp_path, text, quantity="reflectance-factor").M00[0], 0.032 / np.pi
+    )
 
 
 @pytest.mark.parametrize(

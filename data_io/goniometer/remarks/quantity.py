@@ -45,13 +45,15 @@ def stated_quantity(
         cure = "Mend the remark, or give --quantity."
         raise DataFileError(path, problem, cure)
     name = names[0] if len(names) == 1 and not wrong else None
-    _require_one_among(path, table, columns, name or option)
+    per_cent = any(quantity.per_cent for quantity in said)
+    stated = None if name is None else Quantity(name, per_cent)
+    _require_one_among(path, table, columns, stated, option)
     if option is None:
         _require_agreement(path, table, columns, name)
     elif name not in (None, option) and option != "relative":
         msg = f"{path.name}: --quantity {option} overrules the remark, which says {name}."
         warnings.warn(msg, ConventionWarning, stacklevel=4)
-    if any(quantity.per_cent for quantity in said):
+    if per_cent:
         columns = _fractions(columns)
     return columns, name
 
@@ -62,16 +64,25 @@ def _by_name(columns: Columns) -> str | None:
 
 
 def _require_one_among(
-    path: Path, table: RawTable, columns: Columns, stated: str | None
+    path: Path,
+    table: RawTable,
+    columns: Columns,
+    stated: Quantity | None,
+    option: str | None,
 ) -> None:
     """Refuse remarks among the rows that name another quantity than what all rows are."""
-    of_all = stated or _by_name(columns) or "brdf"
+    of_all = stated
+    if of_all is None and option is None:
+        of_all = Quantity(_by_name(columns) or "brdf")
     for line in table.among:
         found = bare_quantity_of(line.text)
-        if found is None or found == Quantity(of_all):
+        of_all = of_all or found
+        if found is None or of_all is None or found == of_all:
             continue
         text = shortened(line.text.strip(), 50)
-        problem = f"expected one quantity, {of_all}, a remark among the rows says {text!r}"
+        problem = (
+            f"expected one quantity, {of_all.name}, a remark among the rows says {text!r}"
+        )
         cure = (
             "Give each quantity a file; or, if all rows are one, remove the remarks among "
             f"them and write # quantity: {found.name} above the table."

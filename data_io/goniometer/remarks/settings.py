@@ -1,5 +1,6 @@
 """Settings that remarks name, where no column does: of all rows, or of those below."""
 
+import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -20,6 +21,11 @@ __all__ = ["brightness_only", "one_wavelength", "with_settings"]
 
 _BRIGHTNESS = {"M00", "S0", "reflectance-factor", "brdf-cos"}
 _BY_FILE = "Give the rows a column {}, or each setting a file."
+# A laser tells rows apart, but has lines of several wavelengths
+_LASER = re.compile(
+    r"(?:he-?ne|nd:?yag|argon|krypton|ruby|co2)(?:[ -]laser)?", re.IGNORECASE
+)
+_SIDES = {"parallel", "perpendicular", "par", "perp"}
 # A band of light is no setting twice, but one colour is not another
 _SAME_WAVE = 0.02
 
@@ -43,10 +49,13 @@ def with_settings(
     waves = columns.wavelength is not None
     turned = bool({"phi_i", "sample_rotation"} & columns.angles.keys())
     gain = "Divide the readings by their gain, if they are not, and remove the remarks."
+    # An azimuth without an owner is the detector's where that has a column
+    azimuth = _azimuth if not {"dphi", "phi_s"} & columns.angles.keys() else _turn
+    polarisation = _polarisation if turned else polarisation_of
     for what, cure, setting, known in (
         ("wavelength", _BY_FILE.format("wavelength_nm"), _wave, waves),
-        ("polarisation", _BY_FILE.format("I_s and one I_p"), polarisation_of, False),
-        ("azimuth of the sample", _BY_FILE.format("sample_rotation_deg"), _azimuth, turned),
+        ("polarisation", _BY_FILE.format("I_s and one I_p"), polarisation, False),
+        ("azimuth of the sample", _BY_FILE.format("sample_rotation_deg"), azimuth, turned),
         ("gain", gain, gain_of, False),
     ):  # fmt: skip
         if not known:
@@ -59,12 +68,24 @@ def with_settings(
 
 def _wave(text: str) -> str | None:
     waves = wavelengths_of(text)
+    if not waves and _LASER.fullmatch(plain(text)):
+        return plain(text)
     return waves[0].words if len(waves) == 1 else None
 
 
 def _azimuth(text: str) -> str | None:
     found = azimuth_of(text)
     return f"{found[0].replace('_', ' ')} {found[2]}" if found else None
+
+
+def _turn(text: str) -> str | None:
+    found = _azimuth(text)
+    return None if found and found.startswith("azimuth") else found
+
+
+def _polarisation(text: str) -> str | None:
+    # A sample may lie parallel to something, which is no polarisation
+    return None if plain(text).lower() in _SIDES else polarisation_of(text)
 
 
 def _require_one(
@@ -157,7 +178,7 @@ def _with_azimuth(
     """Give all rows the azimuth of source or sample that a remark names."""
     said: Mapping[tuple[str, float | None], str] = {
         found[:2]: found[2] for text in table.above if (found := azimuth_of(text))
-        and found[0] != "azimuth"
+        and found[0] in ("phi_i", "sample_rotation")
     }  # fmt: skip
     columned = {"phi_i", "sample_rotation"} & columns.angles.keys()
     if len(said) != 1 or columned:
@@ -201,7 +222,7 @@ def _require_unpolarised(
     """Refuse a remark on the polarisation of all rows over readings that have none."""
     if not brightness_only(columns):
         return
-    said = {p: text for text in table.above if (p := polarisation_of(text))}
+    said = {p: text for text in table.above if (p := _polarisation(text))}
     said.pop("unpolarised", None)
     read = {name: columns.names[name] for name in columns.values if name in _BRIGHTNESS}
     if not said or set(read.values()) & declared.columns.keys():

@@ -45,10 +45,10 @@ _BARE = re.compile(
     re.IGNORECASE,
 )
 # What may be a wavelength, and may be a length of the sample
-_LAST = re.compile(rf".*[,;]\s*(?:at\s+)?({_NUMBER}\s*(?:nm|um|µm))", re.IGNORECASE)
+_LAST = re.compile(rf".*[,;\s]({_NUMBER}\s*(?:nm|um|µm))", re.IGNORECASE)
 _LENGTHS = re.compile(
     r"thick|coat|film|layer|rough|rms|spot|beam|diam|pitch|period|particle|grain|height|"
-    r"depth|step|width|range",
+    r"depth|step|width|range|length|cut-?off|lambda|slit|pinhole|aperture|distance",
     re.IGNORECASE,
 )
 # Light that anybody measures a BRDF with [um]

@@ -150,8 +150,8 @@ def polarisation_of(text: str) -> str | None:
 def azimuth_of(text: str) -> tuple[str, float | None, str] | None:
     """Return the name of the angle of a remark, its size, and its words. [deg]
 
-    It is ``phi_i``, ``sample_rotation``, or ``azimuth`` of who knows what; of a fraction
-    without a unit the size is None.
+    It is ``phi_i``, ``sample_rotation``, or ``azimuth`` and ``rotation`` of who knows what;
+    of a fraction without a unit the size is None.
 
     Examples
     --------
@@ -163,8 +163,8 @@ def azimuth_of(text: str) -> tuple[str, float | None, str] | None:
         return None
     name = "phi_i"
     if match["sample"]:
-        of_sample = match["sample"].lower().startswith("sample")
-        name = "sample_rotation" if of_sample else "azimuth"
+        word = match["sample"].lower()
+        name = "sample_rotation" if word.startswith("sample") else word
     unit = (match["unit"] or match["of_key"] or match["of_name"] or "").lower()
     value = float(match["value"].replace(",", "."))
     words = f"{match['value']} {unit}".strip()
