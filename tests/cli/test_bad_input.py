@@ -199,6 +199,26 @@ BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
     "export to nowhere": (["export", "scene.toml", "-o", "scene.obj"], ".pbsdf"),
     "scan from a pipe": (["check", "-"], "standard input is not read. Save it"),
     "export to a pipe": (["export", "scene.toml", "-o", "-"], "to standard output"),
+    "incidences for a renderer": (
+        ["export", "scene.toml", "-o", "a.pbsdf", "--theta-i-deg", "10"],
+        "--theta-i-deg is not used for .pbsdf",
+    ),
+    "incidences of a result": (
+        ["export", "result.nc", "-o", "a.csv", "--theta-i-deg", "10"],
+        "--theta-i-deg is not used for result.nc",
+    ),
+    "a wavelength of a result": (
+        ["export", "result.nc", "-o", "a.csv", "--wavelength-um", ".5"],
+        "--wavelength-um is not used for result.nc",
+    ),
+    "a seed of a table": (
+        ["export", "scene.toml", "-o", "a.csv", "--seed", "1"],
+        "--seed is not used for .csv, only for meshes",
+    ),
+    "incidences of a mesh": (
+        ["export", "scene.toml", "-o", "a.stl", "--theta-i-deg", "10"],
+        "--theta-i-deg is not used for a mesh",
+    ),
     "dew beyond 180 degrees": (
         ["dew", "--contact-angles-deg", "15,200"],
         "--contact-angles-deg",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pbrdf.cli import option_text, options
+from pbrdf.cli.unused import refuse_unused
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +32,7 @@ MESHES = (".glb", ".stl", ".ply")
 
 
 def command(
+    context: typer.Context,
     source: Annotated[
         Path,
         typer.Argument(
@@ -78,9 +80,11 @@ def command(
     from pbrdf.cli.staging import staged_file
 
     if output.suffix in MESHES:
+        refuse_unused(context, {"theta_i", "wavelength", "convention", "at"}, "for a mesh")
         export_mesh(source, output, base, seed, force=force)
         return
     _check(source, output, convention, at)
+    _check_used(context, source, output)
     accuracy = None
     with staged_file(output, force=force) as stage:
         model = data_io.read_model(source) if source.suffix == ".toml" else None
@@ -128,6 +132,21 @@ def _check(
             f"{convention.value}."
         )
         raise ValueError(msg)
+
+
+def _check_used(context: typer.Context, source: Path, output: Path) -> None:
+    """Refuse what would not change the file."""
+    refuse_unused(context, {"base", "seed"}, f"for {output.suffix}, only for meshes")
+    own = "has incidences of its own"
+    if output.suffix == ".pbsdf":
+        refuse_unused(context, {"theta_i"}, f"for .pbsdf, which {own}")
+    if source.suffix != ".toml":
+        refuse_unused(context, {"theta_i"}, f"for {source.name}, which {own}")
+        from data_io import is_result_store
+
+        if source.suffix == ".nc" or is_result_store(source):
+            whole = f"for {source.name}: all its wavelengths are written"
+            refuse_unused(context, {"wavelength"}, whole)
 
 
 def _renderer_file(
