@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 
 from data_io.goniometer.scan import QUANTITIES, STDERR
-from data_io.goniometer.tables.units import ANGLE_UNITS, unit_named
+from data_io.goniometer.tables.units import ANGLE_UNITS, split_bracket, unit_named
 from pbrdf.optics.published.columns import column_of, unit_of
 
 __all__ = [
@@ -50,7 +50,6 @@ TARGETS = (
 
 _ANGLE_UNITS = {**ANGLE_UNITS, "grad": None}
 _GREEK = {"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "δ": "delta "}
-_IN_BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$")
 _DIVIDED = re.compile(r"^[Mm](\d\d)\s*/\s*[Mm]00$|^[Mm](\d\d)_norm(?:alised|alized)?$")
 # M00_450nm, 450 nm, brdf_stderr_650nm
 _AT_WAVELENGTH = re.compile(
@@ -109,9 +108,9 @@ def meaning_of(name: str) -> Meaning | None:
     if _AT_WAVELENGTH.fullmatch(bracket):
         # BRDF (450 nm)
         plain, bracket = f"{plain} {bracket}", ""
-    elif at := _IN_BRACKETS.match(plain):
+    elif at := split_bracket(plain):
         # BRDF (450 nm) [1/sr]
-        plain = f"{at[1]} {at[2]}" if _AT_WAVELENGTH.fullmatch(at[2]) else plain
+        plain = " ".join(at) if _AT_WAVELENGTH.fullmatch(at[1]) else plain
     found = _angle(plain, bracket)
     if found:
         return found
@@ -134,8 +133,7 @@ def meaning_of(name: str) -> Meaning | None:
 
 def _split(name: str) -> tuple[str, str]:
     """Split the unit in brackets from a name."""
-    found = _IN_BRACKETS.match(name.strip())
-    return (found[1], found[2].strip()) if found and found[1] else (name.strip(), "")
+    return split_bracket(name) or (name.strip(), "")
 
 
 def _angle(plain: str, bracket: str) -> Meaning | None:

@@ -12,7 +12,12 @@ from data_io.goniometer.declarations import Declared
 from data_io.goniometer.scan import RATIOS, STDERR, ConventionWarning
 from data_io.goniometer.tables.names import ANGLES, IGNORE, Meaning, target_of
 from data_io.goniometer.tables.table import RawTable
-from data_io.goniometer.tables.units import bare_name, is_logarithm, written_units
+from data_io.goniometer.tables.units import (
+    bare_name,
+    is_logarithm,
+    split_bracket,
+    written_units,
+)
 from pbrdf.errors import DataFileError
 
 __all__ = [
@@ -39,7 +44,7 @@ def declared_name(name: str, columns: Mapping[str, str]) -> str | None:
     'u(BRDF)'
     """
     bare = bare_name(name)
-    short = re.sub(r"\s*[\[(][^\[\]()]*[\])]$", "", bare)
+    short = (split_bracket(bare) or (bare,))[0]
     return next((key for key in (name, bare, short) if key in columns), None)
 
 

@@ -20,7 +20,6 @@ ANGLE_UNITS = {
 }
 _PER_CENT = ("%", "percent", "per cent", "pct")
 _PER_SR = re.compile(r"(?:1?/|per)(?:sr|steradians?)|sr(?:\^|\*\*)?[-\u2212]1|sr⁻¹")
-_BRACKET = re.compile(r"^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$")
 # What may stand behind a name without brackets and is nothing but a unit
 _BEHIND = re.compile(
     r"^(.*[^\d\s_/,.-])(?:[\s_/,]+|(?=[%°º]))(%|°|º|deg|degrees?|[mu]?rad|radians?|gon|"
@@ -75,6 +74,23 @@ def unit_named(text: str) -> str | None:
     return known or (bare if _UNIT.fullmatch(bare) or _SCALE.fullmatch(bare) else None)
 
 
+def split_bracket(name: str) -> tuple[str, str] | None:
+    """Split what stands in the last brackets behind a name from it, or return None.
+
+    Examples
+    --------
+    >>> split_bracket("R (450 nm) [%]"), split_bracket("[deg]")
+    (('R (450 nm)', '%'), None)
+    """
+    name = name.strip()
+    start = max(name.rfind("["), name.rfind("("))
+    inside = name[start + 1 : -1]
+    if start < 1 or name[-1] not in "])" or {*inside} & {*"])"}:
+        return None
+    head = name[:start].rstrip()
+    return (head, inside.strip()) if head else None
+
+
 def written_units(name: str) -> Written:
     """Take from a name the units in brackets behind it, and one that ends it.
 
@@ -86,13 +102,12 @@ def written_units(name: str) -> Written:
     (Written(name='R (450 nm)', units=('%',)), ())
     """
     units = []
-    while (found := _BRACKET.match(name.strip())) and found[1]:
-        unit = unit_named(found[2])
-        if unit is None and not _is_unit_by_place(name, found[2]):
+    while found := split_bracket(name):
+        unit = unit_named(found[1])
+        if unit is None and not _is_unit_by_place(name, found[1]):
             break
-        unit = unit or found[2]
-        units.append(unit)
-        name = found[1]
+        units.append(unit or found[1])
+        name = found[0]
     behind = _BEHIND.match(name.strip())
     if behind:
         unit = behind[2] or behind[4]
@@ -128,8 +143,8 @@ def bare_name(name: str) -> str:
     >>> bare_name("M00 [1/sr]"), bare_name("[deg]"), bare_name("u(BRDF)")
     ('M00', '[deg]', 'u(BRDF)')
     """
-    while (found := _BRACKET.match(name.strip())) and found[1]:
-        if unit_named(found[2]) is None and not _is_unit_by_place(name, found[2]):
+    while found := split_bracket(name):
+        if unit_named(found[1]) is None and not _is_unit_by_place(name, found[1]):
             break
-        name = found[1]
+        name = found[0]
     return name
