@@ -315,6 +315,17 @@ CHASSIS = "# {}\n# phi_i theta_i phi_o theta_o brdf\n30 0 -20 0 0.5\n30 0 -30 0 
 ASTM = "{}\nVARS theta_i,phi_i,theta_s,phi_s,BRDF\n30,0,20,180,0.05\n"
 
 
+def test_what_was_converted_is_not_written(tmp_path):
+    remarks = "QUANTITY reflectance factor\nPOLARIZATION s\nWAVELENGTH 633 nm"
+    text = ASTM.format(remarks).replace("BRDF", "M00")
+    assert "unpolarised light in M00" in refused(tmp_path, text)
+    scan = read(tmp_path, text, columns={"M00": "M00"})
+    assert_allclose(scan.M00, 0.05 / np.pi)
+    for one in (scan, read(tmp_path, ZEMAX.format("Polarization: p"))):
+        write_goniometer(one, tmp_path / "own.csv")
+        assert_allclose(read_goniometer(tmp_path / "own.csv").M00, one.M00)
+
+
 @pytest.mark.parametrize("text", [ZEMAX, CHASSIS, ASTM])
 def test_formats_know_the_same_wavelengths(tmp_path, text):
     for remark in (

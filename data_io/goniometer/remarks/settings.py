@@ -17,7 +17,7 @@ from data_io.goniometer.tables.table import RawTable
 from data_io.text.text import Line
 from pbrdf.errors import DataFileError, shortened
 
-__all__ = ["brightness_only", "one_wavelength", "with_settings"]
+__all__ = ["one_wavelength", "with_settings"]
 
 _BRIGHTNESS = {"M00", "S0", "reflectance-factor", "brdf-cos"}
 _BY_FILE = "Give the rows a column {}, or each setting a file."
@@ -210,7 +210,7 @@ def _with_azimuth(
     return replace(columns, angles=angles, names={**columns.names, name: name})
 
 
-def brightness_only(columns: Columns) -> bool:
+def _brightness_only(columns: Columns) -> bool:
     """Tell whether all readings are of unpolarised light, by their names."""
     read = {name for name in columns.values if not name.endswith(STDERR)}
     return bool(read) and read <= _BRIGHTNESS
@@ -220,7 +220,7 @@ def _require_unpolarised(
     path: Path, table: RawTable, columns: Columns, declared: Declared
 ) -> None:
     """Refuse a remark on the polarisation of all rows over readings that have none."""
-    if not brightness_only(columns):
+    if not _brightness_only(columns):
         return
     said = {p: text for text in table.above if (p := _polarisation(text))}
     said.pop("unpolarised", None)

@@ -7,11 +7,8 @@ import numpy as np
 
 from data_io.goniometer.declarations import Declared
 from data_io.goniometer.remarks.quantity import stated_quantity
-from data_io.goniometer.remarks.settings import (
-    brightness_only,
-    with_settings,
-)
-from data_io.goniometer.remarks.words import polarisation_of, quantity_of
+from data_io.goniometer.remarks.settings import with_settings
+from data_io.goniometer.remarks.words import quantity_of
 from data_io.goniometer.scan import ELEMENTS, INTENSITIES, STDERR, Scan
 from data_io.goniometer.tables.angles import directions
 from data_io.goniometer.tables.columns import Columns, read_columns
@@ -84,8 +81,7 @@ def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     _require_four(path, values, table.header)
     _drop_unity(path, values, columns.lines)
     # The notes that are written into every file need not pile up
-    plain = brightness_only(columns)
-    kept = [text for text in table.comments if text and not _noted(text, plain)]
+    kept = [text for text in table.comments if text and not _noted(text)]
     return Scan(
         path=path,
         lines=columns.lines,
@@ -205,14 +201,10 @@ def _drop_unity(path: Path, values: dict[str, np.ndarray], lines: list[int]) -> 
         raise DataFileError(path, problem, cure, line=lines[row], column="m00")
 
 
-def _noted(text: str, plain: bool) -> bool:
-    """Tell whether a comment is one that is written, now or in earlier versions.
-
-    So is the quantity; and a polarisation above readings that are declared to have none.
-    """
+def _noted(text: str) -> bool:
+    """Tell whether a comment is one that is written, now or in earlier versions."""
     return (
         text in NOTES
         or text.startswith(("Angles in rad, dphi", "M in 1/sr without"))
         or quantity_of(text) is not None
-        or (plain and polarisation_of(text) is not None)
     )

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from data_io.goniometer.remarks.words import polarisation_of, quantity_of
 from data_io.goniometer.scan import CONVENTIONS, QUANTITIES, STDERR
 from pbrdf.files import complete_file
 
@@ -32,7 +33,7 @@ def write_csv(dataset: xr.Dataset, path: str | Path) -> None:
     for name in (*QUANTITIES, *(f"{name}{STDERR}" for name in QUANTITIES)):
         if name in dataset:
             columns[name] = dataset[name].to_numpy()
-    comments = [*str(dataset.attrs.get("comments", "")).splitlines(), *NOTES]
+    comments = [*_kept_comments(dataset), *NOTES]
     # Without it elements that have no M00 beside them might be ratios to it
     comments.append(f"quantity: {dataset.attrs.get('quantity', 'brdf')}")
     with complete_file(path) as temporary, temporary.open("w", encoding="utf-8") as stream:
@@ -41,6 +42,19 @@ def write_csv(dataset: xr.Dataset, path: str | Path) -> None:
         for row in zip(*(values.tolist() for values in columns.values()), strict=True):
             # repr keeps every digit; an empty cell is what was not measured
             stream.write(",".join("" if x != x else repr(x) for x in row) + "\n")
+
+
+def _kept_comments(dataset: xr.Dataset) -> list[str]:
+    """Return the comments but for those that the numbers have been converted from.
+
+    Those are a quantity, and a polarisation where the light was declared to have none.
+    """
+    plain = {name for name in dataset.data_vars if name in QUANTITIES} == {"M00"}
+    return [
+        text
+        for text in str(dataset.attrs.get("comments", "")).splitlines()
+        if quantity_of(text) is None and not (plain and polarisation_of(text))
+    ]
 
 
 def degrees(angle: xr.DataArray) -> np.ndarray:
