@@ -41,7 +41,8 @@ def test_a_unit_below_k_is_refused(tmp_path, unit, units):
     ) as error:
         read(tmp_path, text)
     assert repr(unit) in str(error.value)
-    assert "k is a wavelength/(4 pi)" in str(error.value)
+    assert ("k = a wavelength/(4 pi)" in str(error.value)) == ("m" in unit)
+    assert ("divide by 4.343" in str(error.value)) == ("dB" in unit)
 
 
 def test_the_cure_of_an_absorption_coefficient(tmp_path):

@@ -27,6 +27,7 @@ _UNIT = re.compile(
     r"\d?(?:\.\d+)?e[-+]?\d+)|[x×*·/]\s*\d+",
     re.IGNORECASE,
 )
+_PER_LENGTH = re.compile(r"(?<!pp)m(?!\w)|å|angstrom", re.IGNORECASE)
 _ATTENUATION = re.compile(
     r"\bn\s*[*·]?\s*\(\s*1\s*[-+±\u2212]\s*(?:[ij]\s*[*·]?\s*(?:k|kappa|κ|x)|"
     r"(?:k|kappa|κ|x)\s*[*·]?\s*[ij])\s*\)",
@@ -65,10 +66,14 @@ def refuse_units(
             continue
         if unit_of(unit) or is_unit_of_number(unit):
             problem = f"expected a number without a unit, got {unit!r} below the name"
-            cure = (
-                "Of an absorption coefficient a, k is a wavelength/(4 pi); of multiples "
-                "and per cent write the number itself. Then empty the cell."
-            )
+            cure = "Write the number itself, and empty the cell."
+            if known.role == "kappa" and _PER_LENGTH.search(unit):
+                cure = (
+                    "Of an absorption coefficient a write k = a wavelength/(4 pi), and "
+                    "empty the cell."
+                )
+                if "db" in unit.lower():
+                    cure = f"1/e of the power is 4.343 dB: divide by 4.343. {cure}"
             raise DataFileError(path, problem, cure, line=units.number, column=name)
 
 
