@@ -211,3 +211,47 @@ def test_errors_keep_their_name_in_a_cure(tmp_path):
         read(tmp_path, head, row)
     scan = read(tmp_path, head, row, columns={"BRF_stderr": "M00_stderr"}, quantity="brdf")
     assert_allclose(scan.M00_stderr, 0.01)
+
+
+# Of one wavelength and one angle: in this unit, with this number
+WAVES = {
+    "nm": 550.0,
+    "um": 0.55,
+    "µm": 0.55,
+    "A": 5500.0,
+    "eV": 1.239841984 / 0.55,
+    "cm-1": 1e4 / 0.55,
+}
+TURNS = {
+    "deg": 30.0,
+    "rad": np.pi / 6,
+    "gon": 100 / 3,
+    "mrad": 1e3 * np.pi / 6,
+    "grads": 100 / 3,
+}
+
+
+@pytest.mark.parametrize("form", ["X [{}]", "X ({})", "X_{}", "X/{}", "X {}", "below"])
+@pytest.mark.parametrize(
+    ("target", "unit", "right"),
+    [
+        *((t, u, 0.55) for u in WAVES for t in ("wavelength_nm", "wavelength_um", "energy_ev")),
+        *((f"theta_i_{t}", u, np.pi / 6) for u in TURNS for t in ("deg", "rad")),
+    ],
+)  # fmt: skip
+def test_no_mapping_changes_a_number(tmp_path, form, target, unit, right):
+    """Every unit in every place under every target: the number is right, or refused."""
+    angle = target.startswith("theta")
+    name = "X" if form == "below" else form.format(unit)
+    below = f"\n{unit},deg,1/sr" if form == "below" else ""
+    value = TURNS[unit] if angle else WAVES[unit]
+    head, row = f"{name},theta_view_deg,BRDF{below}", f"{value:.12g},20,.1"
+    if not angle:
+        head = f"{name},theta_i_deg,theta_view_deg,BRDF" + below.replace(",deg", ",deg,deg")
+        row = f"{value:.12g},30,20,.1"
+    try:
+        scan = read(tmp_path, head, [row], columns={name: target})
+    except DataFileError:
+        assert not target.endswith(f"_{unit.lower()}")
+    else:
+        assert_allclose(scan.theta_i if angle else scan.wavelength, right, rtol=1e-9)

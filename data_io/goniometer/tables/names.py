@@ -108,9 +108,9 @@ def meaning_of(name: str) -> Meaning | None:
     if _AT_WAVELENGTH.fullmatch(bracket):
         # BRDF (450 nm)
         plain, bracket = f"{plain} {bracket}", ""
-    elif at := split_bracket(plain):
+    elif inner := split_bracket(plain):
         # BRDF (450 nm) [1/sr]
-        plain = " ".join(at) if _AT_WAVELENGTH.fullmatch(at[1]) else plain
+        plain = " ".join(inner) if _AT_WAVELENGTH.fullmatch(inner[1]) else plain
     found = _angle(plain, bracket)
     if found:
         return found

@@ -15,6 +15,7 @@ from data_io.goniometer.tables.table import RawTable
 from data_io.goniometer.tables.units import (
     bare_name,
     is_logarithm,
+    spectral_unit_behind,
     split_bracket,
     written_units,
 )
@@ -58,7 +59,10 @@ def honoured(path: Path, table: RawTable, name: str, key: str, said: Declared) -
     """
     target = said.columns[key]
     meaning = target_of(target) or Meaning(IGNORE)
-    units = [unit for unit in written_units(name).units if unit != "1"]
+    written = written_units(name)
+    units = [unit for unit in written.units if unit != "1"]
+    if meaning.name == "wavelength" and (behind := spectral_unit_behind(written.name)):
+        units.append(behind)
     expanded = meaning.stderr and _EXPANDED.search(name)
     if expanded:
         problem = f"expected a standard error, got an expanded one, {expanded[0]}"

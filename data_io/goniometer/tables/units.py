@@ -22,13 +22,13 @@ _PER_CENT = ("%", "percent", "per cent", "pct")
 _PER_SR = re.compile(r"(?:1?/|per)(?:sr|steradians?)|sr(?:\^|\*\*)?[-\u2212]1|sr⁻¹")
 # What may stand behind a name without brackets and is nothing but a unit
 _BEHIND = re.compile(
-    r"^(.*[^\d\s_/,.-])(?:[\s_/,]+|(?=[%°º]))(%|°|º|deg|degrees?|[mu]?rad|radians?|gon|"
-    r"arcmin|arcsec|nm|um|µm|μm|angstroms?|percent|per cent|pct)$|"
+    r"^(.*[^\d\s_/,.-])(?:[\s_/,]+|(?=[%°º]))(%|°|º|deg|degrees?|[mu]?rads?|(?:milli)?radians?|gons?|"
+    r"grads?|gradians?|turns?|arcmin|arcsec|nm|um|µm|μm|angstroms?|percent|per cent|pct)$|"
     r"^(.*\d)[\s_]+(%|percent|pct)$",
     re.IGNORECASE,
 )
 _BASE = (
-    r"sr|rads?|deg|gons?|grad(?:ian)?s?|arcmin|arcsec|eV|Hz|W|V|A|J|K|m|s|g|cts?|counts?|ppm|dB|bits?|"
+    r"sr|rads?|deg|gons?|grad(?:ian)?s?|turns?|steps?|arcmin|arcsec|eV|Hz|W|V|A|J|K|m|s|g|cts?|counts?|ppm|dB|bits?|"
     r"px|a\.?u\.?|arb\.?(?: ?u(?:nits?)?\.?)?|inch|in|mil|°|%|‰|lm|lx|cd|rel\.?|relative"
 )
 _POWER = r"(?:\^?[-+\u2212⁻]?[\d⁰¹²³⁴]+|[⁻¹²³]+)?"
@@ -114,6 +114,19 @@ def written_units(name: str) -> Written:
         units.append(unit_named(unit) or unit)
         name = behind[1] or behind[3]
     return Written(name.strip(), tuple(dict.fromkeys(units)))
+
+
+def spectral_unit_behind(name: str) -> str | None:
+    """Return the unit that ends the name of a column of wavelengths, or None.
+
+    Examples
+    --------
+    >>> spectral_unit_behind("L_A"), spectral_unit_behind("E/eV"), spectral_unit_behind("A")
+    ('angstrom', 'ev', None)
+    """
+    words = re.split(r"[\s_/,]+", name.strip())
+    # "lambda_a" is rather one of several
+    return unit_of(words[-1]) if len(words) > 1 and words[-1] != "a" else None
 
 
 def is_logarithm(unit: str) -> bool:
