@@ -255,3 +255,24 @@ def test_no_mapping_changes_a_number(tmp_path, form, target, unit, right):
         assert not target.endswith(f"_{unit.lower()}")
     else:
         assert_allclose(scan.theta_i if angle else scan.wavelength, right, rtol=1e-9)
+
+
+# Of a reflectance factor of 0.5: in this unit, with this number
+SCALES = {"%": 50.0, "percent": 50.0, "‰": 500.0, "ppm": 5e5, "x 1000": 500.0, "10^-3": 500.0, "1e-2": 50.0, "1/msr": 5e-4, "mV": 38.5, "a.u.": 38.5}  # fmt: skip
+
+
+@pytest.mark.parametrize("form", ["X [{}]", "X ({})", "X_{}", "X {}", "below"])
+@pytest.mark.parametrize("unit", SCALES)
+@pytest.mark.parametrize("target", ["M00", FACTOR, "I_s"])
+def test_no_mapping_changes_a_reading(tmp_path, form, unit, target):
+    name = "X" if form == "below" else form.format(unit)
+    below = f"\ndeg,deg,{unit}" if form == "below" else ""
+    declared = {} if target == FACTOR else {"quantity": FACTOR}
+    row = f"30,20,{SCALES[unit]:.12g}"
+    try:
+        scan = read(tmp_path, told(name) + below, [row], columns={name: target}, **declared)
+    except DataFileError:
+        assert unit not in ("%", "percent")
+    else:
+        value = scan["M00" if target == FACTOR else target]
+        assert_allclose(value, 0.5 / np.pi, rtol=1e-9)

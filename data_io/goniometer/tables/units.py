@@ -18,26 +18,34 @@ ANGLE_UNITS = {
     **dict.fromkeys(("deg", "degree", "degrees", "°", "º"), "deg"),
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
 }
-_PER_CENT = ("%", "percent", "per cent", "pct")
+_PER_CENT = (
+    "%", "percent", "per cent", "pct", "percents", "percentage", "prozent", "in %",
+    "in percent", "in per cent",
+)  # fmt: skip
 _PER_SR = re.compile(r"(?:1?/|per)(?:sr|steradians?)|sr(?:\^|\*\*)?[-\u2212]1|sr⁻¹")
 # What may stand behind a name without brackets and is nothing but a unit
 _BEHIND = re.compile(
-    r"^(.*[^\d\s_/,.-])(?:[\s_/,]+|(?=[%°º]))(%|°|º|deg|degrees?|[mu]?rads?|(?:milli)?radians?|gons?|"
-    r"grads?|gradians?|turns?|arcmin|arcsec|nm|um|µm|μm|angstroms?|percent|per cent|pct)$|"
+    r"^(.*[^\d\s_/,.-])(?:[\s_/,]+|(?=[%°º]))(%|°|º|deg|degrees?|[mu]?rads?|"
+    r"(?:milli)?radians?|gons?|grads?|gradians?|turns?|arcmin|arcsec|nm|um|µm|μm|"
+    r"angstroms?|(?:in )?per ?cent|in %|percents|percentage|pct|prozent|‰|ppm|"
+    r"per ?mille|promille|[mµu]V|a\.u\.?|[x×*·] ?10+|[x×*·]? ?10(?:\^[-+]?|[-+])\d+|"
+    r"\d?e[-+]\d+|(?:(?:10\^|\d?e)[-+]?\d+ ?)?1?/ ?[mµuk]?sr|[mµuk]?sr\^?-1)$|"
     r"^(.*\d)[\s_]+(%|percent|pct)$",
     re.IGNORECASE,
 )
 _BASE = (
-    r"sr|rads?|deg|gons?|grad(?:ian)?s?|turns?|steps?|arcmin|arcsec|eV|Hz|W|V|A|J|K|m|s|g|cts?|counts?|ppm|dB|bits?|"
-    r"px|a\.?u\.?|arb\.?(?: ?u(?:nits?)?\.?)?|inch|in|mil|°|%|‰|lm|lx|cd|rel\.?|relative"
+    r"sr|rads?|deg|gons?|grad(?:ian)?s?|turns?|steps?|per ?mille|promille|arcmin|arcsec|eV|"
+    r"Hz|W|V|A|J|K|m|s|g|cts?|counts?|ppm|dB|bits?|px|a\.?u\.?|"
+    r"arb\.?(?: ?u(?:nits?)?\.?)?|inch|in|mil|°|%|‰|lm|lx|cd|rel\.?|relative"
 )
 _POWER = r"(?:\^?[-+\u2212⁻]?[\d⁰¹²³⁴]+|[⁻¹²³]+)?"
 _ONE = rf"(?:[fpnuµμmckMGT]?(?:{_BASE}){_POWER}|1)"
 _UNIT = re.compile(rf"{_ONE}(?:(?: ?[*·/.] ?| ){_ONE})*|/ ?{_ONE}")
 # "x 1000", "10^-3", "1e-3", "E-3"
 _SCALE = re.compile(
-    r"[x×*·/]? ?(?:10+|10 ?(?:\^|\*\*) ?[-+\u2212]?\d+|10[⁻⁺]?[¹²³⁴⁵⁶⁷⁸⁹]|"
-    r"\d?(?:\.\d+)?[eE][-+]?\d+)|[x×*·/] ?\d+"
+    r"(?:[x×*·/]? ?(?:10+|10 ?(?:(?:\^|\*\*) ?[-+\u2212]?|[-+\u2212])\d+|"
+    r"10[⁻⁺]?[¹²³⁴⁵⁶⁷⁸⁹]|\d?(?:\.\d+)?[eE][-+]?\d+)|[x×*·/] ?\d+)"
+    rf"(?:[ ·*/]*(?:{_UNIT.pattern}))?"
 )
 # Of these single letters polarisations are meant
 _NO_UNIT = ("s", "p", "h")
