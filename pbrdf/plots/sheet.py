@@ -193,7 +193,8 @@ def scene_of(result: xr.Dataset) -> str:
     parts = []
     surface = scene.get("surface", {})
     if surface:
-        words = [f"{surface.get('type', 'surface')} surface"]
+        kind = surface.get("type", "surface").replace("gaussian", "Gaussian")
+        words = [f"{kind} surface"]
         if isinstance(surface.get("slope_rms"), float):
             words.append(f"slope {surface['slope_rms']:.3g}")
         parts.append(" ".join(words))
