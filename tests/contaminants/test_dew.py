@@ -153,7 +153,7 @@ def test_a_warning_that_differs_in_its_numbers_is_told_once():
 def test_the_figure_of_numbers_says_what_it_shows(result):
     figure = signature_figure(result)
     title = figure.get_suptitle()
-    assert "gaussian surface slope 0.05, n 1.5" in title
+    assert "Gaussian surface slope 0.05, n 1.5" in title
     assert "P = √(M10² + M20² + M30²)" in title
     assert "2 standard errors" in title
     lobe = figure.axes[0]
