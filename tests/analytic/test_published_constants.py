@@ -198,3 +198,13 @@ def test_scene_files_take_and_keep_constants_of_files(tmp_path):
         (tmp_path / "again.toml").write_text(Scene(HeightMap.flat(), kept).to_toml())
         again = pbrdf.load_scene(tmp_path / "again.toml").materials[0]
         assert (again.n, again.kappa) == (kept.n, kept.kappa)
+
+
+def test_a_formula_without_terms_is_a_number_at_each_wavelength(tmp_path):
+    path = tmp_path / "constant.yml"
+    path.write_text(
+        "REFERENCES: x\nDATA:\n  - type: formula 2\n"
+        "    wavelength_range: 0.3 2.5\n    coefficients: 0.5\n"
+    )
+    n, _ = materials.read(path).indices(np.array([0.4, 0.5, 2.0]))
+    assert_allclose(n, [np.sqrt(1.5)] * 3)

@@ -160,4 +160,6 @@ class Formula:
     def __call__(self, wavelength: npt.ArrayLike) -> np.ndarray:
         """Index n. [1]"""
         checked = require_in_range(wavelength, self.valid_range)
-        return np.asarray(FORMULAS[self.number].index(checked, self.coefficients))
+        index = FORMULAS[self.number].index(checked, self.coefficients)
+        # A formula without terms is one number
+        return np.array(np.broadcast_to(index, np.shape(checked)))
