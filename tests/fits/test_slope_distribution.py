@@ -72,7 +72,7 @@ def test_the_command_line_draws_the_surface_and_writes_its_slopes(tmp_path, caps
     rows = surface(7).heights.T.copy()
     path = tmp_path / "map.csv"
     rows[20:26, 30:36] = np.nan
-    np.savetxt(path, rows, delimiter=",", header="dx_um = 1.0\ndy_um = 0.5")
+    np.savetxt(path, rows, delimiter=",", header="dx_um = 1.0\ndy_um = 0.5\nunit = um")
     picture, table = tmp_path / "map.png", tmp_path / "slopes.csv"
     options = ["--figure", str(picture), "--slopes", str(table), "--cutoff-um", "3"]
     assert main(["statistics", str(path), *options]) == 0, capsys.readouterr().err

@@ -18,7 +18,7 @@ CASES = Path(__file__).parents[1] / "cases" / "surface"
 @pytest.mark.parametrize("name", ["line.csv", "plane2.csv"])
 def test_exact_planes_have_no_roughness(name):
     reader = read_profile if name == "line.csv" else read_height_map
-    found = surface_statistics(reader(CASES / name))
+    found = surface_statistics(reader(CASES / name, unit="um"))
     for estimate in (found.height_rms, found.slope_rms, found.noise_rms):
         assert (estimate.value, estimate.stderr, estimate.high) == (0, 0, 0)
     assert all(axis.slope_rms.value == 0 for axis in found.axes)
