@@ -1,10 +1,16 @@
-"""Options that a command would not look at are refused, not dropped."""
+"""Which options were typed; those that a command would not look at are refused."""
 
 from collections.abc import Collection
 
 import typer
 
-__all__ = ["refuse_unused"]
+__all__ = ["refuse_unused", "was_typed"]
+
+
+def was_typed(context: typer.Context, name: str) -> bool:
+    """Tell whether a parameter of a command was given on the command line."""
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"
 
 
 def refuse_unused(context: typer.Context, names: Collection[str], beside: str) -> None:
@@ -25,8 +31,6 @@ def refuse_unused(context: typer.Context, names: Collection[str], beside: str) -
         Naming the first of them.
     """
     for parameter in context.command.params:
-        source = context.get_parameter_source(str(parameter.name))
-        typed = source is not None and source.name == "COMMANDLINE"
-        if typed and parameter.name in names:
+        if parameter.name in names and was_typed(context, parameter.name):
             msg = f"{parameter.opts[0]} is not used {beside}. Leave it out."
             raise ValueError(msg)

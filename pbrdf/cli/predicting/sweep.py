@@ -7,6 +7,7 @@ import typer
 
 from pbrdf.cli import option_text, options
 from pbrdf.cli.options import Stokes
+from pbrdf.cli.unused import was_typed
 
 if TYPE_CHECKING:
     from pbrdf.sweeps import Report, Sweep
@@ -111,11 +112,7 @@ def _described(context: typer.Context, source: Path, vary: list[str]) -> "Sweep"
     from pbrdf.files import read_toml
     from pbrdf.sweeps import load_sweep, sweep_of
 
-    given = [
-        name
-        for name in _IN_FILE
-        if getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"
-    ]
+    given = [name for name in _IN_FILE if was_typed(context, name)]
     if not vary and ("vary" in read_toml(source) or "scene" in read_toml(source)):
         if given:
             option = given[0].replace("_", "-")

@@ -8,22 +8,10 @@ it instead, and makes of it what it always does.
 from collections import namedtuple
 
 from pbrdf.kernels import jit
+from pbrdf.kernels.meshes.facets import image_of
 from pbrdf.kernels.meshes.memory import call_embree_packet
-from pbrdf.kernels.terrain.embree import (
-    ALL,
-    DIRECTION,
-    FACE,
-    FARTHEST,
-    FLAGS,
-    GEOMETRY,
-    ID,
-    INSTANCE,
-    MASK,
-    NEAREST,
-    NOTHING,
-    ORIGIN,
-    TIME,
-)
+from pbrdf.kernels.optics.vectors import Vec
+from pbrdf.kernels.terrain.embree import FACE, GEOMETRY, INSTANCE, NOTHING, write_ray
 
 LANES = 8
 # Flags of a packet: rays that take the same way through Embree's tree, and any others
@@ -58,22 +46,16 @@ def face_and_image(mesh, told):
 def put_ray(mesh, member, x, y, z, k_x, k_y, k_z, farthest, told):
     """Add a ray of a line [um] to the packet, which is sent when it is full."""
     frame, packet = mesh.frame, mesh.packet
-    ray, words = packet.ray, packet.words
-    lane = packet.filled[0]
-    ray[ORIGIN * LANES + lane] = (x - frame.center_x) * frame.scale
-    ray[(ORIGIN + 1) * LANES + lane] = (y - frame.center_y) * frame.scale
-    ray[(ORIGIN + 2) * LANES + lane] = (z - frame.center_z) * frame.scale
-    ray[NEAREST * LANES + lane] = 0.0
-    ray[DIRECTION * LANES + lane] = k_x
-    ray[(DIRECTION + 1) * LANES + lane] = k_y
-    ray[(DIRECTION + 2) * LANES + lane] = k_z
-    ray[TIME * LANES + lane] = 0.0
-    ray[FARTHEST * LANES + lane] = farthest * frame.scale
-    words[MASK * LANES + lane] = ALL
-    words[ID * LANES + lane] = 0
-    words[FLAGS * LANES + lane] = 0
-    words[GEOMETRY * LANES + lane] = NOTHING
-    words[INSTANCE * LANES + lane] = NOTHING
+    words, lane = packet.words, packet.filled[0]
+    origin = Vec(
+        (x - frame.center_x) * frame.scale,
+        (y - frame.center_y) * frame.scale,
+        (z - frame.center_z) * frame.scale,
+    )
+    write_ray(
+        packet.ray, words, lane, LANES, origin, Vec(k_x, k_y, k_z), 0.0,
+        farthest * frame.scale,
+    )  # fmt: skip
     packet.valid[lane] = -1
     packet.members[lane] = member
     packet.filled[0] = lane + 1
@@ -92,8 +74,7 @@ def send_packet(mesh, told):
     for lane in range(packet.filled[0]):
         answer = MISSES
         if words[GEOMETRY * LANES + lane] != NOTHING:
-            instance = words[INSTANCE * LANES + lane]
-            image = 0 if instance == NOTHING else int(instance)
+            image = image_of(words[INSTANCE * LANES + lane])
             answer = told_hit(mesh, int(words[FACE * LANES + lane]), image)
         told[packet.members[lane]] = answer
         packet.valid[lane] = 0

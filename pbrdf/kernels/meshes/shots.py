@@ -15,19 +15,12 @@ from pbrdf.kernels.meshes.search import (
 )
 from pbrdf.kernels.optics.vectors import Vec, axes_across
 from pbrdf.kernels.terrain.embree import (
-    ALL,
-    DIRECTION,
     FACE,
     FARTHEST,
-    FLAGS,
     GEOMETRY,
-    ID,
     INSTANCE,
-    MASK,
-    NEAREST,
     NOTHING,
-    ORIGIN,
-    TIME,
+    write_ray,
 )
 from pbrdf.kernels.terrain.heightfield import ESCAPED, HIT
 
@@ -43,29 +36,24 @@ WIDER = 4.0
 
 
 @jit(forceinline=True)
-def write_ray(mesh, x, y, z, k_x, k_y, k_z, nearest, farthest):
+def aim(mesh, x, y, z, k_x, k_y, k_z, nearest, farthest):
     """Write a ray from a place [um] along the unit vector k for Embree, in float32."""
-    frame, ray, words = mesh.frame, mesh.ray, mesh.words
-    ray[ORIGIN] = (x - frame.center_x) * frame.scale
-    ray[ORIGIN + 1] = (y - frame.center_y) * frame.scale
-    ray[ORIGIN + 2] = (z - frame.center_z) * frame.scale
-    ray[NEAREST] = nearest * frame.scale
-    ray[DIRECTION] = k_x
-    ray[DIRECTION + 1] = k_y
-    ray[DIRECTION + 2] = k_z
-    ray[TIME] = 0.0
-    ray[FARTHEST] = farthest * frame.scale
-    words[MASK] = ALL
-    words[ID] = 0
-    words[FLAGS] = 0
-    words[GEOMETRY] = NOTHING
-    words[INSTANCE] = NOTHING
+    frame = mesh.frame
+    origin = Vec(
+        (x - frame.center_x) * frame.scale,
+        (y - frame.center_y) * frame.scale,
+        (z - frame.center_z) * frame.scale,
+    )
+    write_ray(
+        mesh.ray, mesh.words, 0, 1, origin, Vec(k_x, k_y, k_z), nearest * frame.scale,
+        farthest * frame.scale,
+    )  # fmt: skip
 
 
 @jit(forceinline=True)
 def shoot(mesh, x, y, z, k_x, k_y, k_z, nearest, farthest, arguments):
     """Let Embree follow a ray to the first facet, or call back for all of them."""
-    write_ray(mesh, x, y, z, k_x, k_y, k_z, nearest, farthest)
+    aim(mesh, x, y, z, k_x, k_y, k_z, nearest, farthest)
     call_embree(mesh.intersect, mesh.scene, mesh.place, arguments)
 
 
@@ -73,7 +61,7 @@ def shoot(mesh, x, y, z, k_x, k_y, k_z, nearest, farthest, arguments):
 def is_blocked(mesh, x, y, z, d_x, d_y, d_z):
     """Whether anything lies on the way from a place to another at (d_x, d_y, d_z). [um]"""
     length = math.sqrt(d_x * d_x + d_y * d_y + d_z * d_z)
-    write_ray(mesh, x, y, z, d_x / length, d_y / length, d_z / length, 0.0, length)
+    aim(mesh, x, y, z, d_x / length, d_y / length, d_z / length, 0.0, length)
     call_embree(mesh.occluded, mesh.scene, mesh.place, 0)
     # Embree marks a ray that something stops
     return mesh.ray[FARTHEST] < 0.0

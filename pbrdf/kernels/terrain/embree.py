@@ -13,6 +13,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from pbrdf.kernels import jit
+from pbrdf.kernels.optics.vectors import Vec
 from pbrdf.kernels.terrain.heightfield import (
     ESCAPED,
     FACET_LOW,
@@ -62,6 +63,28 @@ def call_embree(typing_context, function, scene, ray):
 
 
 @jit(forceinline=True)
+def write_ray(ray, words, lane, lanes, origin, direction, nearest, farthest):
+    """Write a ray, in units of the mesh, as one of so many that lie word by word.
+
+    `words` is the memory of `ray` as uint32.
+    """
+    ray[ORIGIN * lanes + lane] = origin.x
+    ray[(ORIGIN + 1) * lanes + lane] = origin.y
+    ray[(ORIGIN + 2) * lanes + lane] = origin.z
+    ray[NEAREST * lanes + lane] = nearest
+    ray[DIRECTION * lanes + lane] = direction.x
+    ray[(DIRECTION + 1) * lanes + lane] = direction.y
+    ray[(DIRECTION + 2) * lanes + lane] = direction.z
+    ray[TIME * lanes + lane] = 0.0
+    ray[FARTHEST * lanes + lane] = farthest
+    words[MASK * lanes + lane] = ALL
+    words[ID * lanes + lane] = 0
+    words[FLAGS * lanes + lane] = 0
+    words[GEOMETRY * lanes + lane] = NOTHING
+    words[INSTANCE * lanes + lane] = NOTHING
+
+
+@jit(forceinline=True)
 def first_face(terrain, tree, i, j, facet, u, v, z, k_x, k_y, k_z):
     """Face of the mesh that a ray meets first, or -1."""
     frame, ray, words = tree.frame, tree.ray, tree.words
@@ -75,20 +98,7 @@ def first_face(terrain, tree, i, j, facet, u, v, z, k_x, k_y, k_z):
         x -= slope_x * lift
         y -= slope_y * lift
         height += lift
-    ray[ORIGIN] = x
-    ray[ORIGIN + 1] = y
-    ray[ORIGIN + 2] = height
-    ray[NEAREST] = 0.0
-    ray[DIRECTION] = k_x
-    ray[DIRECTION + 1] = k_y
-    ray[DIRECTION + 2] = k_z
-    ray[TIME] = 0.0
-    ray[FARTHEST] = math.inf
-    words[MASK] = ALL
-    words[ID] = 0
-    words[FLAGS] = 0
-    words[GEOMETRY] = NOTHING
-    words[INSTANCE] = NOTHING
+    write_ray(ray, words, 0, 1, Vec(x, y, height), Vec(k_x, k_y, k_z), 0.0, math.inf)
     call_embree(tree.intersect, tree.scene, tree.place)
     if words[GEOMETRY] == NOTHING:
         return -1
