@@ -91,3 +91,14 @@ def test_refusals_name_options(
     said = capsys.readouterr().err
     assert words in said
     assert said.count("\n") == 1
+
+
+def test_a_model_that_notes_its_surface_is_no_scene(folder: Path) -> None:
+    notes = {"surface": {"slope_rms": {"value": 0.3, "stderr": 0.01}}}
+    write_model(MODEL, folder / "noted.toml", notes=notes)
+    options = ["--sun-zenith-deg", "30", "--wavelength-um", "0.55"]
+    assert main(["radiance", "noted.toml", *options, "-o", "noted.csv"]) == 0
+    assert main(["radiance", "model.toml", *options, "-o", "plain.csv"]) == 0
+    assert pd.read_csv("noted.csv", comment="#").equals(
+        pd.read_csv("plain.csv", comment="#")
+    )

@@ -264,7 +264,9 @@ def _read(source: Path) -> Any:
     if source.suffix != ".toml":
         msg = f"source must be a model (.toml) or a result (.nc), got {source.name}."
         raise ValueError(msg)
-    if "surface" in read_toml(source):
+    tables = read_toml(source)
+    # The model of a pipeline notes the statistics of its surface
+    if "surface" in tables and "model" not in tables:
         msg = (
             f"source must be a model or a result, {source.name} is a scene. Run `pbrdf "
             "simulate` with --theta-i-deg at the zeniths of the sensor, and give its .nc."
