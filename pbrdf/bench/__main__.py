@@ -13,19 +13,20 @@ import numba
 import numpy as np
 
 from pbrdf import __version__
-from pbrdf.bench.measure import model_errors, reference, run, true_errors
-from pbrdf.bench.scenes import CASES, Case
+from pbrdf.bench.errors_over_time import measure
+from pbrdf.bench.scenes import CASES
 
-ESTIMATORS = {"reduced": True, "plain": False}
-# Realisations of a run, and those of its reference as a multiple of the most
+# Nodes a side, rays and realisations of the shortest run, seeds, the rms error sought, and
+# the core-seconds that a way or the reference of a case may take
 FULL = {
-    "side": 256,
-    "n_rays": 15_000,
-    "realizations": (16, 64, 256),
-    "seeds": 8,
-    "longer": 40,
-}
-QUICK = {"side": 128, "n_rays": 4000, "realizations": (16, 64), "seeds": 4, "longer": 20}
+    "side": 256, "n_rays": 15_000, "realizations": 16, "seeds": 8, "error": 0.003,
+    "core_seconds": 120.0,
+}  # fmt: skip
+QUICK = FULL | {"side": 128, "n_rays": 4000, "seeds": 4, "error": 0.01, "core_seconds": 8.0}
+LOOKS = {
+    "reduced": "C0o-", "plain": "C1s-", "observe": "C0o-", "NumPy + embreex": "C2^-",
+    "Mitsuba 3": "C4v-",
+}  # fmt: skip
 
 
 def machine() -> dict[str, Any]:
@@ -57,67 +58,75 @@ def _processor() -> str:
     return platform.processor()
 
 
-def measure(case: Case, plan: dict[str, Any], workers: int | None) -> dict[str, Any]:
-    """Errors and times of one case for both estimators and every length of run."""
-    most = max(plan["realizations"])
-    truth = reference(case, plan["side"], plan["n_rays"], most * plan["longer"])
-    runs: list[dict[str, Any]] = []
-    for name, reduced in ESTIMATORS.items():
-        options = {
-            "variance_reduction": reduced, "n_rays": plan["n_rays"], "workers": workers,
-            "stokes": "unpolarized",
-        }  # fmt: skip
-        # The first run of a kind compiles
-        run(case, plan["side"], realizations=2, **options)
-        for realizations in plan["realizations"]:
-            found = true_errors(
-                case, plan["side"], truth, range(plan["seeds"]),
-                realizations=realizations, **options,
-            )  # fmt: skip
-            runs.append({"estimator": name, "realizations": realizations} | found)
-    return {
-        "case": case.name, "runs": runs, "model": model_errors(case, truth),
-        "gain": gain(runs),
-    }  # fmt: skip
-
-
-def gain(runs: list[dict[str, Any]]) -> dict[str, float | None]:
-    """Divide the times to one error, plain by reduced, at the longest runs."""
-    most = max(one["realizations"] for one in runs)
-    ends = {one["estimator"]: one for one in runs if one["realizations"] == most}
-    gains: dict[str, float | None] = {}
-    for name in ("rms", "median_bin", "worst_bin"):
-        slow, fast = (
-            ends[key][name] ** 2 * ends[key]["seconds"] for key in ("plain", "reduced")
-        )
-        gains[name] = slow / fast if fast > 0.0 else None
-    return gains
-
-
 def draw(results: list[dict[str, Any]], path: Path) -> None:
-    """Draw true error over wall time, a panel a case."""
+    """Draw true error over processor time, a panel a case."""
     from matplotlib.figure import Figure
 
     columns = min(4, len(results))
     rows = -(-len(results) // columns)
-    figure = Figure(figsize=(3.2 * columns, 2.8 * rows), layout="constrained")
-    panels = np.atleast_1d(figure.subplots(rows, columns, sharey=True)).ravel()
+    figure = Figure(figsize=(3.0 * columns, 2.6 * rows), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
+    seen: dict[str, Any] = {}
     for panel, result in zip(panels, results, strict=False):
-        for name in ESTIMATORS:
-            runs = [one for one in result["runs"] if one["estimator"] == name]
-            panel.loglog(
-                [one["seconds"] for one in runs],
-                [max(100 * one["rms"], 1e-2) for one in runs], "o-", label=name,
-            )  # fmt: skip
-        if result["model"] is not None:
-            panel.axhline(100 * result["model"]["rms"], color="0.5", ls=":", label="model")
-        panel.set_title(result["case"], fontsize="medium")
-        panel.set_xlabel("wall time [s]")
-    panels[0].set_ylabel("true error, rms over bins [%]")
-    panels[0].legend(fontsize="small")
+        for name, found in result["ways"].items():
+            times, errors = np.array(
+                [[one["core_seconds"], 100.0 * one["rms"]] for one in found["runs"]]
+            ).T
+            (line,) = panel.loglog(times, errors, LOOKS[name], ms=4)
+            seen.setdefault(name, line)
+        if result["model_rms"] is not None:
+            seen["model"] = panel.axhline(100.0 * result["model_rms"], color="0.4", ls=":")
+        panel.axhline(1.0, color="0.8", lw=0.8, zorder=0)
+        panel.set_title(_title(result), fontsize="medium")
+    for panel in panels[: len(results)][-columns:]:
+        panel.set_xlabel("processor time [s]")
+        panel.tick_params(labelbottom=True)
+    for panel in panels[::columns]:
+        panel.set_ylabel("true error, rms [%]")
     for panel in panels[len(results) :]:
         panel.set_visible(False)
-    figure.savefig(path, dpi=150)
+    figure.legend(seen.values(), seen, loc="outside lower center", ncols=len(seen))
+    figure.savefig(path, dpi=110)
+
+
+def _title(result: dict[str, Any]) -> str:
+    gained = (result["gain"] or {}).get("rms")
+    return result["case"] + ("" if gained is None else f": {gained:.3g} times")
+
+
+def table(result: dict[str, Any]) -> list[str]:
+    """Lines for one case."""
+    lines = [
+        f"{result['case']}: {result['bins']} bins above a tenth of the peak, "
+        f"reference to {100 * result['reference_rms']:.2f} %"
+    ]
+    for name, found in result["ways"].items():
+        for one in found["runs"]:
+            bias = np.sqrt(abs(one["bias_squared"]))
+            sign = "" if one["bias_squared"] > 0 else "under "
+            lines.append(
+                f"  {name:15} {one['realizations']:6d} realisations"
+                f" {one['core_seconds']:8.3f} s of processor, {one['seconds']:8.3f} s"
+                f"   rms {100 * one['rms']:7.3f} %   bias {sign}{100 * bias:.2f} %"
+            )
+        to_one = found["variance"]["rms"] / 0.01**2
+        slope = "-" if found["slope"] is None else f"{found['slope']:.2f}"
+        lines.append(f"  {name:15} 1 % in {to_one:.3g} s of processor, slope {slope}")
+    if result["model_rms"] is not None:
+        lines.append(f"  model           bias {100 * result['model_rms']:.2f} %")
+    if result["gain"] is not None:
+        told = [
+            f"{name} {'without end' if value is None else format(value, '.1f')}"
+            for name, value in result["gain"].items()
+        ]
+        lines.append(f"  time to one error, plain / reduced: {', '.join(told)}")
+    parts = result["stages"]
+    lines.append(
+        f"  stages: {1e3 * parts['call']:.1f} ms a call, "
+        f"{1e3 * parts['realization']:.2f} ms a realisation, "
+        f"{parts['million_rays']:.2f} s a million rays"
+    )
+    return lines
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -125,11 +134,23 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m pbrdf.bench", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="small surfaces and few seeds")
     parser.add_argument("--case", action="append", choices=[one.name for one in CASES])
-    parser.add_argument("--workers", type=int, default=None)
+    parser.add_argument("--workers", type=int, default=1, help="threads of the engine")
+    parser.add_argument(
+        "--core-seconds", type=float, help="of the longest runs of a way, and a reference"
+    )
     parser.add_argument("--output", type=Path, default=Path("bench-output"))
+    parser.add_argument(
+        "--draw", type=Path, metavar="JSON", help="only draw what an earlier run stored"
+    )
     given = parser.parse_args(arguments)
-    plan = QUICK if given.quick else FULL
     given.output.mkdir(parents=True, exist_ok=True)
+    figure = given.output / "error-over-time.png"
+    if given.draw:
+        draw(json.loads(given.draw.read_text())["results"], figure)
+        return 0
+    plan: dict[str, Any] = dict(QUICK if given.quick else FULL)
+    if given.core_seconds is not None:
+        plan["core_seconds"] = given.core_seconds
     results = []
     for case in CASES:
         if given.case and case.name not in given.case:
@@ -140,29 +161,8 @@ def main(arguments: list[str] | None = None) -> int:
         sys.stdout.flush()
         record = {"machine": machine(), "plan": plan, "results": results}
         (given.output / "bench.json").write_text(json.dumps(record, indent=1))
-    draw(results, given.output / "error-over-time.png")
+    draw(results, figure)
     return 0
-
-
-def table(result: dict[str, Any]) -> list[str]:
-    """Lines for one case."""
-    lines = [f"{result['case']}"]
-    for one in result["runs"]:
-        lines.append(
-            f"  {one['estimator']:8} {one['realizations']:5d} realisations"
-            f" {one['seconds']:8.3f} s  rms {100 * one['rms']:7.3f} %"
-            f"  median {100 * one['median_bin']:7.3f} %"
-            f"  worst {100 * one['worst_bin']:7.3f} %"
-            f"  (reference {100 * one['reference_rms']:.3f} %)"
-        )
-    if result["model"] is not None:
-        lines.append(f"  model    bias {100 * result['model']['rms']:.2f} %")
-    told = [
-        f"{name} {'more than can be told' if value is None else format(value, '.1f')}"
-        for name, value in result["gain"].items()
-    ]
-    lines.append(f"  time to one error, plain / reduced: {', '.join(told)}")
-    return lines
 
 
 if __name__ == "__main__":

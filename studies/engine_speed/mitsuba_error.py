@@ -1,6 +1,6 @@
 """Time to 1 % in all bins: this engine beside a loop over Mitsuba 3, on the same surfaces.
 
-Needs Mitsuba and this project in one environment; see `mitsuba_loop.py` for the rest. Both
+Needs Mitsuba and this project in one environment; see `pbrdf/bench/mitsuba_loop.py`. Both
 use all cores, draw 512 x 512 cells a realisation and count everything but the start of
 Python; the engine is counted once more as a whole command, from TOML file to netCDF file.
 """
@@ -13,16 +13,14 @@ import time
 import warnings
 from pathlib import Path
 
-import drjit as dr
-import mitsuba as mi
-import mitsuba_loop as loop
 import numpy as np
 from run import SLOPE, surface
 
 import pbrdf
+from pbrdf.bench import mitsuba_loop as loop
 
 THETA, PHI, N = 60.0, 0.3, 1.5
-loop.N_THETA, loop.N_DPHI = 18, 36
+BINS = (18, 36)
 SCENE = """
 [surface]
 type = "gaussian"
@@ -55,12 +53,12 @@ def by_mitsuba(side, realizations):
     start = time.perf_counter()
     for seed in range(realizations):
         heights = drawn.sample(seed).heights
-        flux = dr.zeros(mi.Float, 3 * loop.N_THETA * loop.N_DPHI * 16)
+        flux = loop.no_light(BINS)
         begun = time.perf_counter()
         scene = loop.build_scene(heights)
         building += time.perf_counter() - begun
-        loop.trace(scene, heights, np.deg2rad(THETA), PHI, N, side, flux, seed)
-        samples.append(np.array(flux).reshape(3, loop.N_THETA, loop.N_DPHI, 16)[..., 0])
+        loop.trace(scene, heights, np.deg2rad(THETA), PHI, N, side, flux, BINS, seed)
+        samples.append(np.array(flux).reshape(3, *BINS, 16)[..., 0])
     took = time.perf_counter() - start
     light = np.array(samples) / side**2
     albedo = light.sum(axis=(2, 3)).mean(axis=0)
@@ -73,7 +71,7 @@ def by_engine(n_rays, realizations, **how):
     start = time.perf_counter()
     result = pbrdf.simulate(
         scene, np.deg2rad(THETA), n_rays=n_rays, realizations=realizations,
-        n_theta=loop.N_THETA, n_dphi=loop.N_DPHI, **how,
+        n_theta=BINS[0], n_dphi=BINS[1], **how,
     )  # fmt: skip
     took = time.perf_counter() - start
     return result.attrs["rel_error"], took, result.albedo.values.ravel()
@@ -90,7 +88,7 @@ def by_command(n_rays, target):
                 sys.executable, "-m", "pbrdf", "simulate", str(scene),
                 "--theta-i-deg", str(THETA), "--phi-i-deg", "uniform", "--fold",
                 "--n-rays", str(n_rays), "--target-rel-error", str(target),
-                "--n-theta", str(loop.N_THETA), "--n-dphi", str(loop.N_DPHI),
+                "--n-theta", str(BINS[0]), "--n-dphi", str(BINS[1]),
                 "--output", str(Path(folder) / "out.nc"),
             ],
             check=True, capture_output=True,

@@ -9,9 +9,9 @@ import warnings
 
 import numpy as np
 from embree_replay import Replay
-from plain import simulate_plainly
 
 import pbrdf
+from pbrdf.bench.yardstick import simulate_plainly
 from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.plan import Plan, Tally
 from pbrdf.simulation.skips import SKIPS

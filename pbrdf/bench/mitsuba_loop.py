@@ -1,15 +1,10 @@
 """The same physics as a loop over Mitsuba 3, its mesh and its intersector, as a yardstick.
 
-Not needed by anything else: install mitsuba into an environment of its own and run
-
-    DRJIT_LIBLLVM_PATH=/path/to/libLLVM.so python mitsuba_loop.py heights.npy
-
-with a height map of unit spacing that repeats (`run.py --heights heights.npy` writes the
-one of the benchmark). Rays start in scan order; one thread.
+Only where Mitsuba is installed, with an LLVM that it finds or that DRJIT_LIBLLVM_PATH
+names. Heights have unit spacing and repeat; rays start in scan order.
 """
 
-import argparse
-import time
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -19,10 +14,9 @@ mi.set_variant("llvm_ad_mono_polarized")
 
 GUARD = 64  # cells of wrapped surface round the period
 BOUNCES = 6
-N_THETA, N_DPHI = 45, 90
 
 
-def build_scene(heights):
+def build_scene(heights: np.ndarray) -> Any:
     """Mesh of the period and a guard band of wrapped cells."""
     nx, ny = heights.shape
     z = np.pad(heights, ((GUARD, GUARD + 1), (GUARD, GUARD + 1)), mode="wrap")
@@ -40,7 +34,7 @@ def build_scene(heights):
     return mi.load_dict({"type": "scene", "surface": mesh})
 
 
-def turned(m, cos, sin):
+def turned(m: Any, cos: Any, sin: Any) -> list[Any]:
     """Rows of a matrix in a frame turned by an angle."""
     c2, s2 = cos * cos - sin * sin, 2.0 * cos * sin
     q = [c2 * m[1][k] + s2 * m[2][k] for k in range(4)]
@@ -48,7 +42,7 @@ def turned(m, cos, sin):
     return [m[0], q, u, m[3]]
 
 
-def reflected(m, cosine, n):
+def reflected(m: Any, cosine: Any, n: float) -> list[Any]:
     """Rows after reflection by glass."""
     q = dr.sqrt(n * n - 1.0 + cosine * cosine)
     r_s = (cosine - q) / (cosine + q)
@@ -62,8 +56,17 @@ def reflected(m, cosine, n):
     ]
 
 
-def trace(scene, heights, theta, phi, n, side, flux, seed):
-    """Add the light of side x side rays to `flux` (3, N_THETA, N_DPHI, 4, 4)."""
+def no_light(bins: tuple[int, int]) -> Any:
+    """Room for the light of all bounces and bins (n_theta, n_dphi)."""
+    return dr.zeros(mi.Float, 3 * bins[0] * bins[1] * 16)
+
+
+def trace(  # noqa: PLR0913  (a program of its own)
+    scene: Any, heights: np.ndarray, theta: float, phi: float, n: float, side: int,
+    flux: Any, bins: tuple[int, int], seed: int,
+) -> None:  # fmt: skip
+    """Add the light of side x side rays to `flux` (3, n_theta, n_dphi, 4, 4)."""
+    n_theta, n_dphi = bins
     nx, ny = heights.shape
     index = dr.arange(mi.UInt32, side * side)
     shift = np.random.default_rng(seed).random(2)
@@ -82,7 +85,7 @@ def trace(scene, heights, theta, phi, n, side, flux, seed):
         *[one for row in matrix for one in row],
     )  # fmt: skip
 
-    def body(place, k, s, bounces, active, *flat):
+    def body(place: Any, k: Any, s: Any, bounces: Any, active: Any, *flat: Any) -> Any:
         m = [list(flat[4 * r : 4 * r + 4]) for r in range(4)]
         ray = mi.Ray3f(place, k)
         hit = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
@@ -93,13 +96,13 @@ def trace(scene, heights, theta, phi, n, side, flux, seed):
         across = dr.normalize(dr.cross(k, normal) + mi.Vector3f(1e-12, 0.0, 0.0))
         new = turned(m, dr.dot(across, s), dr.dot(across, dr.cross(k, s)))
         new = reflected(new, cosine, n)
-        flat = [dr.select(met, new[i // 4][i % 4], flat[i]) for i in range(16)]
+        now = [dr.select(met, new[i // 4][i % 4], flat[i]) for i in range(16)]
         out = dr.normalize(k + 2.0 * cosine * normal)
         place = dr.select(met, si.spawn_ray(out).o, place)
         k = dr.select(met, out, k)
         s = dr.select(met, across, s)
         bounces = bounces + dr.select(met, mi.UInt32(1), mi.UInt32(0))
-        return place, k, s, bounces, met & (bounces < BOUNCES), *flat
+        return place, k, s, bounces, met & (bounces < BOUNCES), *now
 
     state = dr.while_loop(state, lambda *now: now[4], body)
     _, k, s, bounces, _, *flat = state
@@ -107,37 +110,12 @@ def trace(scene, heights, theta, phi, n, side, flux, seed):
     up = (k.z > 0.0) & (bounces > 0) & (bounces < BOUNCES)
     meridian = dr.normalize(mi.Vector3f(-k.y, k.x, 0.0))
     m = turned(m, dr.dot(meridian, s), dr.dot(meridian, dr.cross(k, s)))
-    i = dr.minimum(mi.UInt32(dr.acos(k.z) * (N_THETA / (0.5 * np.pi))), N_THETA - 1)
+    i = dr.minimum(mi.UInt32(dr.acos(k.z) * (n_theta / (0.5 * np.pi))), n_theta - 1)
     turn = (dr.atan2(k.y, k.x) - phi) / (2.0 * np.pi)
     turn = turn - dr.floor(turn)
-    j = mi.UInt32(turn * N_DPHI + 0.5) % N_DPHI
-    at = ((dr.minimum(bounces, 3) - 1) * N_THETA + i) * N_DPHI + j
+    j = mi.UInt32(turn * n_dphi + 0.5) % n_dphi
+    at = ((dr.minimum(bounces, 3) - 1) * n_theta + i) * n_dphi + j
     for e in range(16):
         dr.scatter_add(flux, m[e // 4][e % 4], at * 16 + e, up)
     dr.eval(flux)
     dr.sync_thread()
-
-
-def main():
-    """Print the rate, and the albedo by bounces for comparison."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("heights")
-    parser.add_argument("--side", type=int, default=1024)
-    parser.add_argument("--repeats", type=int, default=6)
-    options = parser.parse_args()
-    dr.set_thread_count(1)
-    heights = np.load(options.heights)
-    scene = build_scene(heights)
-    best = np.inf
-    for seed in range(options.repeats):
-        flux = dr.zeros(mi.Float, 3 * N_THETA * N_DPHI * 16)
-        start = time.process_time()
-        trace(scene, heights, np.deg2rad(60.0), 0.3, 1.5, options.side, flux, seed)
-        best = min(best, time.process_time() - start)
-    rays = options.side**2
-    albedo = np.array(flux).reshape(3, -1, 16)[..., 0].sum(axis=1) / rays
-    print(f"{rays / best / 1e6:.2f} M paths a core-second, albedo by bounces {albedo}")
-
-
-if __name__ == "__main__":
-    main()

@@ -11,7 +11,7 @@ from embreex.rtcore_scene import EmbreeScene
 TILES = 3  # copies of the period along x and y
 
 
-def build_scene(heights):
+def build_scene(heights: np.ndarray) -> tuple[EmbreeScene, np.ndarray]:
     """Embree scene of 3 x 3 periods of a height field of unit spacing, and its normals."""
     nx, ny = heights.shape
     z = np.tile(heights, (TILES, TILES))
@@ -35,7 +35,7 @@ def build_scene(heights):
     return scene, normals
 
 
-def rotation(old_s, prop, new_s):
+def rotation(old_s: np.ndarray, prop: np.ndarray, new_s: np.ndarray) -> np.ndarray:
     """Mueller rotations of beams along `prop` from the axes old_s to new_s."""
     cos = (old_s * new_s).sum(1)
     sin = (np.cross(prop, old_s) * new_s).sum(1)
@@ -47,7 +47,7 @@ def rotation(old_s, prop, new_s):
     return turn
 
 
-def fresnel(cosine, index):
+def fresnel(cosine: np.ndarray, index: complex) -> np.ndarray:
     """Reflection matrices in the facet's frame."""
     q = np.sqrt(index**2 - (1 - cosine**2) + 0j)
     r_s = (cosine - q) / (cosine + q)
@@ -62,12 +62,15 @@ def fresnel(cosine, index):
     return matrix
 
 
-def normalised(vectors):
+def normalised(vectors: np.ndarray) -> np.ndarray:
     """Vectors of unit length."""
     return vectors / np.linalg.norm(vectors, axis=1)[:, None]
 
 
-def simulate_plainly(heights, theta, index, n_rays, n_theta, n_dphi, rng, max_bounces=16):
+def simulate_plainly(
+    heights: np.ndarray, theta: float, index: complex, n_rays: int, n_theta: int,
+    n_dphi: int, rng: np.random.Generator, max_bounces: int = 16,
+) -> np.ndarray:  # fmt: skip
     """Mean Mueller matrix a ray, by bounces and bin: (3, n_theta, n_dphi, 4, 4)."""
     scene, normals = build_scene(heights)
     nx, ny = heights.shape
