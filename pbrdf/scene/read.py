@@ -99,10 +99,11 @@ def _read_surface(table: dict[str, Any], source: Path) -> Surface:
     if kind == "mesh":
         return _read_mesh(table, source)
     if kind == "gaussian":
-        check_present(table, ("shape", "spacing_um", "corr_length_um"), "surface", source)
+        check_present(table, ("corr_length_um",), "surface", source)
+        # Without them the surface takes a grid of its own
+        grid = {"shape": "shape", "spacing_um": "spacing"}
         return GaussianSurface(
-            shape=_pair(table["shape"]),
-            spacing=_pair(table["spacing_um"]),
+            **{name: _pair(table[key]) for key, name in grid.items() if key in table},
             corr_length=_pair(table["corr_length_um"]),
             slope_rms=table.get("slope_rms"),
             height_rms=table.get("height_rms_um"),

@@ -8,6 +8,8 @@ from pbrdf.errors import check_seed, require
 
 # A period of fewer nodes holds no surface worth the name
 LEAST_NODES = 8
+# Where no shape is given: powers of two at least, and correlation lengths a period
+LEAST_POWER, LENGTHS = 8, 16
 
 
 def grid_shape(shape: Any) -> tuple[int, int]:
@@ -22,6 +24,12 @@ def grid_shape(shape: Any) -> tuple[int, int]:
         msg = f"shape must {rule}, got {shape!r}. Count the nodes along x and y."
         raise ValueError(msg)
     return int(sides[0]), int(sides[1])
+
+
+def default_shape(cells: np.ndarray) -> tuple[int, int]:
+    """Return nodes (nx, ny) for so many cells a correlation length along each axis."""
+    nx, ny = (1 << max(int(np.ceil(np.log2(LENGTHS * one))), LEAST_POWER) for one in cells)
+    return nx, ny
 
 
 def generator(

@@ -8,11 +8,13 @@ import scipy.fft
 
 from pbrdf.errors import require
 from pbrdf.memory import check_surface
-from pbrdf.surface.drawing import generator, grid_shape
+from pbrdf.surface.drawing import default_shape, generator, grid_shape
 from pbrdf.surface.heightmap import HeightMap
 
 # Amplitude, as a share of the largest, below which a wave is left out
 STOPPED = 1e-7
+# Cells a correlation length where no spacing is given
+CELLS = 8
 # Rows transformed together: they stay in the cache
 ROWS = 32
 
@@ -23,10 +25,13 @@ class GaussianSurface:
 
     Parameters
     ----------
-    shape : (int, int)
-        Number of grid nodes (nx, ny); the periods are shape times spacing.
-    spacing : float or (float, float)
-        Grid steps dx, dy. [um]
+    shape : (int, int), optional
+        Number of grid nodes (nx, ny); the periods are shape times spacing. By default
+        powers of two, at least 256, with periods of 16 correlation lengths or more.
+    spacing : float or (float, float), optional
+        Grid steps dx, dy. [um] By default an eighth of the correlation length of each axis.
+        `studies/surface_resolution` measures what either costs in accuracy, and
+        `studies/variance_reduction/plan.py` in time.
     corr_length : float or (float, float)
         Where the autocorrelation falls to 1/e, one value or (lx, ly). [um]
     slope_rms : float, optional
@@ -62,8 +67,8 @@ class GaussianSurface:
     3.397
     """
 
-    shape: tuple[int, int]
-    spacing: float | tuple[float, float]
+    shape: tuple[int, int] = None  # type: ignore[assignment]  # filled in below
+    spacing: float | tuple[float, float] = None  # type: ignore[assignment]
     corr_length: float | tuple[float, float]
     slope_rms: float | None = None
     height_rms: float | None = None
@@ -89,6 +94,12 @@ class GaussianSurface:
                 # Plain numbers, whatever NumPy type they came in: they go into files
                 plain = checked.tolist()
                 object.__setattr__(self, name, plain if checked.ndim == 0 else tuple(plain))
+        if self.spacing is None:
+            steps = (self._lengths / CELLS).tolist()
+            spacing = steps[0] if np.ndim(self.corr_length) == 0 else tuple(steps)
+            object.__setattr__(self, "spacing", spacing)
+        if self.shape is None:
+            object.__setattr__(self, "shape", default_shape(self._lengths / self._steps))
         object.__setattr__(self, "shape", grid_shape(self.shape))
         periods = np.asarray(self.shape) * self._steps
         if (periods < 4 * self._lengths).any():

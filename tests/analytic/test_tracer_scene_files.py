@@ -1,5 +1,7 @@
 """Scenes written to TOML and read back, and what a wrong file is told."""
 
+import tomllib
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -102,7 +104,7 @@ GLASS = "[substrate]\nn = 1.5\n"
         (FLAT + '[substrate]\nmaterial = "bk7"\nn = 1.5\n', "stands beside other keys"),
         (
             '[surface]\ntype = "gaussian"\nshape = [64, 64]\n' + GLASS,
-            "'spacing_um' is missing",
+            "'corr_length_um' is missing",
         ),
         ('[surface]\ntype = "height_map"\nspacing_um = 1\n' + GLASS, "Give exactly one"),
         (
@@ -160,3 +162,15 @@ def test_errors_name_the_keys_of_the_file(tmp_path, text, words):
     )
     with pytest.raises(DataFileError, match=words):
         load_scene(path)
+
+
+def test_a_scene_file_may_leave_the_grid_open(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        '[surface]\ntype = "gaussian"\ncorr_length_um = [6.0, 12.0]\nslope_rms = 0.2\n'
+        "[substrate]\nn = 1.5\n"
+    )
+    scene = load_scene(path)
+    assert scene.surface == GaussianSurface(corr_length=(6.0, 12.0), slope_rms=0.2)
+    # Written out, so that a file says what was traced
+    assert tomllib.loads(scene.to_toml())["surface"]["spacing_um"] == [0.75, 1.5]
