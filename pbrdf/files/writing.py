@@ -4,11 +4,13 @@ What is being written has an unguessable name that tells which process on which 
 writes it, so that a later run can clear away what a killed one has left.
 """
 
+import ctypes
 import errno
 import os
 import re
 import shutil
 import socket
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -19,6 +21,8 @@ __all__ = ["FULL", "ExistsError", "complete_file", "complete_folder"]
 
 # No space left, over quota, file too large for the limits of the process
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+# Ends the name of what has been moved aside
+_OLD = "-old"
 _PART = re.compile(r"^\..*\.part-(?P<host>[\w-]+)-(?P<pid>\d+)-")
 
 
@@ -89,9 +93,9 @@ def complete_folder(target: Path, *, replace: bool = False) -> Iterator[Path]:
         If the parent does not exist, or the target holds anything and `replace` is False.
     """
     _check_folder(target)
+    _clear_leftovers(target.parent)
     if not replace and target.exists() and not _empty_folder(target):
         raise ExistsError(target)
-    _clear_leftovers(target.parent)
     stage = Path(tempfile.mkdtemp(prefix=_prefix(target), dir=target.parent))
     try:
         yield stage
@@ -134,11 +138,31 @@ def _put_folder(stage: Path, target: Path, *, replace: bool) -> None:
     except OSError:
         if not replace:
             raise ExistsError(target) from None
+        if _exchanged(stage, target):
+            _remove(stage)
+            return
         # Two renames: at no moment does the target hold half of the old and of the new
-        old = Path(tempfile.mkdtemp(prefix=_prefix(target), dir=target.parent))
+        old = Path(tempfile.mkdtemp(prefix=_prefix(target), suffix=_OLD, dir=target.parent))
         target.rename(old / target.name)
         stage.rename(target)
         shutil.rmtree(old)
+
+
+def _exchanged(one: Path, other: Path) -> bool:
+    """Give two files or folders each other's name in one step; False if none can."""
+    if sys.platform != "linux":
+        return False
+    # Python has no name for it; 2 is RENAME_EXCHANGE of renameat2(2)
+    rename = getattr(ctypes.CDLL(None), "renameat2", None)
+    here = -100
+    return rename is not None and not rename(here, bytes(one), here, bytes(other), 2)
+
+
+def _remove(entry: Path) -> None:
+    if entry.is_dir() and not entry.is_symlink():
+        shutil.rmtree(entry)
+    else:
+        entry.unlink()
 
 
 def _take_name(stage: Path, path: Path) -> None:
@@ -173,10 +197,17 @@ def _clear_leftovers(folder: Path) -> None:
             if not found or found["host"] != host or _runs(int(found["pid"])):
                 continue
             with suppress(OSError):
-                if entry.is_dir() and not entry.is_symlink():
-                    shutil.rmtree(entry)
-                else:
-                    entry.unlink()
+                if entry.name.endswith(_OLD) and entry.is_dir():
+                    _put_back(entry)
+                _remove(entry)
+
+
+def _put_back(old: Path) -> None:
+    """Put back a folder whose process ended before another took its place."""
+    for held in old.iterdir():
+        target = old.parent / held.name
+        if not target.exists():
+            held.rename(target)
 
 
 def _runs(pid: int) -> bool:
