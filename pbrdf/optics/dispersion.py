@@ -80,8 +80,11 @@ class Table:
             "wavelength", wavelength, lambda v: (v > 0) & np.isfinite(v),
             "be finite and > 0 [um]", "Vacuum wavelengths are in micrometres.",
         )  # fmt: skip
+        # As of a material without a table
+        above = name == "n"
         column = require(
-            name, values, lambda v: (v >= 0) & np.isfinite(v), "be finite and >= 0 [1]",
+            name, values, lambda v: ((v > 0) if above else (v >= 0)) & np.isfinite(v),
+            f"be finite and {'>' if above else '>='} 0 [1]",
             "The index is n + i kappa with kappa >= 0 absorbing.",
         )  # fmt: skip
         if grid.ndim != 1 or grid.shape != column.shape or len(grid) < 2:

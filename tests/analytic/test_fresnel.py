@@ -110,6 +110,16 @@ def test_bad_values_are_named(arguments, message):
         specular_mueller(*arguments)
 
 
+def test_a_table_follows_the_rules_of_a_constant():
+    """Its kappa may be 0, as that of glass."""
+    waves = [0.4, 0.5]
+    Material.from_table(wavelength=waves, n=[1.4, 1.5], kappa=[0.0, 0.0])
+    with pytest.raises(
+        ValueError, match=r"n must be finite and > 0 \[1\], got 0 at index 1"
+    ):
+        Material.from_table(wavelength=waves, n=[1.4, 0.0], kappa=[1.0, 1.0])
+
+
 def test_complex_index_is_refused_not_reinterpreted():
     with pytest.raises(TypeError, match="n must be real, got complex"):
         specular_mueller(0.5, 1.5 - 0.1j)
