@@ -88,8 +88,9 @@ def _text(path: Path) -> str | None:
     content = path.read_bytes()
     if content[:1] == b"t" and content[:12] == b"tensor_file\0":
         return None
-    mark = content[:2]
-    code = "utf-16" if mark in (b"\xff\xfe", b"\xfe\xff") else "latin-1"
-    # A mark of byte order is nothing wherever it stands
-    text = content.decode(code, errors="replace").replace("\ufeff", "")
+    # A text of two bytes a sign may have lost its mark of byte order
+    codes = ["latin-1", *(["utf-16-le", "utf-16-be"] if b"\0" in content else [])]
+    text = "\n".join(content.decode(code, errors="replace") for code in codes)
+    # The mark is nothing wherever it stands
+    text = text.replace("\ufeff", "")
     return None if path.suffix in (".bsdf", ".toml") else text
