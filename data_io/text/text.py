@@ -13,6 +13,8 @@ from data_io.text.notation import DECIMAL, plain_notation, unquoted
 from pbrdf.errors import DataFileError
 
 COMMENT_MARKS = ("#", "%")
+# Lines of words before the numbers, of which there may be a million
+MOST_HEADER = 100_000
 
 
 class Line(NamedTuple):
@@ -129,6 +131,8 @@ def _blocks(texts: list[str]) -> list[list[int]]:
             continue
         if not inside:
             if not _is_data(text):
+                if i > MOST_HEADER and not blocks:
+                    break
                 continue
             blocks.append([])
             inside = True

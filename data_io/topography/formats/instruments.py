@@ -7,7 +7,7 @@ optional dependency, the extra ``pbrdf[formats]``.
 import struct
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,12 @@ import h5py
 import numpy as np
 
 from data_io.micrograph.levels import unheard
-from data_io.text.files import NotAMapError
+from data_io.text.files import NotAMapError, read_bytes
 from data_io.text.units import LENGTH_UNITS, normalise_unit, unit_factor
 from data_io.topography.channels import choose_channel
 from data_io.topography.formats.sur import plain_sur
 from data_io.topography.plausible import ScaleWarning, check_scale, with_spacing
 from pbrdf.errors import DataFileError
-from pbrdf.files import read_bounded
 from pbrdf.files.hdf5 import opened
 from pbrdf.surface.heightmap import HeightMap
 
@@ -41,6 +40,8 @@ INSTRUMENT_SUFFIXES = {
 }
 
 
+# Of tables that the package is given
+_LONGEST_LINE, _MOST_ROWS = 100_000, 20_000
 _NO_HEIGHT = 1e30
 _NANO_PER_MILLI = 1e-6
 _PARK_TAG = 50432
@@ -183,10 +184,39 @@ def _open(path: Path) -> Any:
         raise DataFileError(path, problem, cure) from error
     if h5py.is_hdf5(path):
         # Its data could lie in any file that can be read here
-        with opened(path, read_bounded(path)):
+        with opened(path):
             pass
     with _faults(path):
-        return SurfaceTopography.open_topography(plain_sur(path) or str(path))
+        sur = plain_sur(path)
+        if sur is not None:
+            return SurfaceTopography.open_topography(sur, format="sur")
+        return _open_detected(path)
+
+
+def _open_detected(path: Path) -> Any:
+    """Open a file by the first reader of the package that takes it.
+
+    The package does the same, but gives its readers of tables every file: one of zeros or
+    of words they read many times over.
+    """
+    from SurfaceTopography import open_topography
+    from SurfaceTopography.Exceptions import CannotDetectFileFormat
+    from SurfaceTopography.IO import MagicMatch, readers
+
+    content = read_bytes(path)
+    start, lines = content[:512], content.split(b"\n")
+    text = b"\0" not in content and path.suffix.lower() not in INSTRUMENT_SUFFIXES
+    text = text and max(map(len, lines)) < _LONGEST_LINE
+    # Of a matrix each line is a row
+    tables = {"xyz": text, "asc": text and len(lines) < _MOST_ROWS}
+    for reader in readers:
+        name = reader.format()
+        if reader.can_read(start) == MagicMatch.NO or not tables.get(name, True):
+            continue
+        # Forty parsers of other formats fail in every way there is
+        with suppress(Exception):
+            return open_topography(str(path), format=name)
+    raise CannotDetectFileFormat
 
 
 @contextmanager
