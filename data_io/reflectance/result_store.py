@@ -181,7 +181,7 @@ def _load(
             variable = stored.variables[name].load()
         if variable.dtype.kind in "OT":
             variable = variable.copy(data=variable.to_numpy().astype(str))
-        found = list(_digests(variable, {}, group).values())
+        found = list(_digests(variable, {}, group, *written[:1]).values())
     except FAULTS as error:
         problem = f"cannot be read: {first_line(error)}"
         raise DataFileError(path, problem, DAMAGED, column=place) from error
@@ -235,7 +235,7 @@ def _chunks(variable: xr.Variable) -> tuple[int, ...]:
 
 
 def _digests(
-    variable: xr.Variable, first: Mapping[str, int], group: int = 0
+    variable: xr.Variable, first: Mapping[str, int], group: int = 0, *like: str
 ) -> dict[tuple[int, ...], str]:
     """Return checksums by place: of each direction, and each group of wavelengths."""
     found = {}
@@ -246,7 +246,7 @@ def _digests(
             dim: slice(k, k + steps[dim]) for (dim, _), k in zip(sides, place, strict=True)
         }
         key = tuple(k + first.get(dim, 0) for (dim, _), k in zip(sides, place, strict=True))
-        found[key] = digest(variable.isel(own))
+        found[key] = digest(variable.isel(own), *like)
     return found
 
 

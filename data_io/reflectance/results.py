@@ -1,8 +1,10 @@
 """Result datasets in netCDF files, complete with their attributes."""
 
 import json
+import math
 import warnings
 from collections.abc import Hashable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +25,11 @@ from data_io.reflectance.attributes import (
 from data_io.reflectance.result_store import read_store, write_store
 from data_io.text.files import read_bytes
 from pbrdf.errors import DataFileError
-from pbrdf.files import complete_file
+from pbrdf.files import complete_file, file_size
 from pbrdf.files.hdf5 import FAULTS, first_line, opened
 
+# Pieces of a variable; smaller ones take longer to read [bytes]
+_CHUNK = 2**20
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
@@ -71,10 +75,11 @@ def write_result(dataset: xr.Dataset, path: str | Path) -> None:
     encoded.attrs = encode(dataset.attrs)
     for name, variable in dataset.variables.items():
         encoded[name].attrs = encode(variable.attrs)
+    packed = {"zlib": True, "complevel": 4, "shuffle": True}
     encoding: dict[Hashable, dict[str, Any]] = {
-        name: {"zlib": True, "complevel": 4, "shuffle": True}
+        name: packed | {"chunksizes": _chunks(variable)}
         for name, variable in dataset.data_vars.items()
-        if variable.ndim and variable.dtype.kind in "fiu"
+        if variable.ndim and variable.size and variable.dtype.kind in "fiu"
     }
     checksums = {str(name): digest(one) for name, one in encoded.variables.items()}
     checksums[OF_ATTRS] = digest_of_attrs(encoded.attrs)
@@ -83,6 +88,15 @@ def write_result(dataset: xr.Dataset, path: str | Path) -> None:
     content = encoded.to_netcdf(engine="h5netcdf", encoding=encoding)
     with complete_file(path) as temporary:
         temporary.write_bytes(content)
+
+
+def _chunks(variable: xr.DataArray) -> tuple[int, ...]:
+    """Cut a variable, the first dimensions first, into pieces that follow its order."""
+    sides = list(variable.shape)
+    for k, side in enumerate(sides):
+        size = variable.dtype.itemsize * math.prod(sides)
+        sides[k] = max(min(side, side * _CHUNK // size), 1)
+    return tuple(sides)
 
 
 def read_result(path: str | Path) -> xr.Dataset:
@@ -98,15 +112,16 @@ def read_result(path: str | Path) -> xr.Dataset:
     """
     if Path(path).suffix == ".zarr":
         return _plain_again(path, read_store(path))
-    content = read_bytes(path)
-    if not content.startswith(_HDF5_MAGIC):
+    if _start(path) != _HDF5_MAGIC:
+        # Says more of a file that cannot be read, or is empty
+        read_bytes(path)
         problem = "expected a netCDF 4 file, the content is something else"
         raise DataFileError(path, problem, "Give a result file (.nc) of this program.")
     try:
         # Names of variables decide nothing: wavelength units are no times
         with (
             warnings.catch_warnings(action="ignore"),
-            opened(path, content) as file,
+            opened(path) as file,
             h5netcdf.File(file, "r") as inside,
             xr.open_dataset(H5NetCDFStore(inside), decode_times=False) as stored,
         ):
@@ -118,6 +133,14 @@ def read_result(path: str | Path) -> xr.Dataset:
         problem = f"expected a complete netCDF 4 file, got: {first_line(error)}"
         raise DataFileError(path, problem, "The file is truncated or damaged.") from error
     return _plain_again(path, dataset)
+
+
+def _start(path: str | Path) -> bytes:
+    """Return the first bytes of a regular file, none if it cannot be read."""
+    file_size(path)
+    with suppress(OSError), Path(path).open("rb") as stream:
+        return stream.read(len(_HDF5_MAGIC))
+    return b""
 
 
 def _plain_again(path: str | Path, dataset: xr.Dataset) -> xr.Dataset:
@@ -157,7 +180,8 @@ def _check_digests(path: str | Path, dataset: xr.Dataset) -> None:
         problem = "they are not those that were written: their checksum differs"
         raise DataFileError(path, problem, cure, column="attributes")
     for name, variable in dataset.variables.items():
-        if written and written.get(str(name)) != digest(variable):
+        expected = written.get(str(name), "")
+        if written and expected != digest(variable, expected):
             problem = "the values are not those that were written: its checksum differs"
             raise DataFileError(path, problem, cure, column=f"variable {name}")
     missing = sorted(set(written) - set(map(str, dataset.variables)))

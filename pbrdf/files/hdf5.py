@@ -2,12 +2,15 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from operator import lt
 from pathlib import Path
+from typing import BinaryIO
 
 import h5py
 import numpy as np
 
 from pbrdf.errors import DataFileError
+from pbrdf.files.reading import file_size
 
 __all__ = ["DAMAGED", "FAULTS", "first_line", "opened"]
 
@@ -31,6 +34,8 @@ MOST_EXPANSION = 2000
 MOST_BYTES = 16 * 2**30
 # Name and version of a global heap
 _HEAP = b"GCOL\1\0\0\0"
+_WORD = np.frombuffer(_HEAP, "<u4")[0]
+_BLOCK = 2**20
 HOSTILE = "A file holds its own data; do not read it from a stranger."
 DAMAGED = "The file is damaged; copy it again or repeat the run."
 
@@ -42,23 +47,27 @@ def first_line(error: BaseException) -> str:
 
 
 @contextmanager
-def opened(path: str | Path, content: bytes) -> Iterator[h5py.File]:
-    """Open a file in memory; refuse one whose data lie elsewhere, are missing, or are many.
+def opened(path: str | Path) -> Iterator[h5py.File]:
+    """Open a file; refuse one whose data lie elsewhere, are missing, or are many.
 
     Raises
     ------
     DataFileError
         Naming the variable.
     """
-    _check_heaps(path, content)
+    size = file_size(path)
     try:
-        file = h5py.File(h5py.h5f.open_file_image(content))
+        with Path(path).open("rb") as stream:
+            _check_heaps(path, stream, size)
+        file = h5py.File(path, "r", locking=False)
+    except DataFileError:
+        raise
     except FAULTS as error:
         problem = f"expected a complete HDF5 file, got: {first_line(error)}"
         raise DataFileError(path, problem, "The file is truncated or damaged.") from error
     with file:
         try:
-            _check_group(path, file, len(content))
+            _check_group(path, file, size)
         except DataFileError:
             raise
         except FAULTS as error:
@@ -68,24 +77,47 @@ def opened(path: str | Path, content: bytes) -> Iterator[h5py.File]:
         yield file
 
 
-def _check_heaps(path: str | Path, content: bytes) -> None:
+def _check_heaps(path: str | Path, stream: BinaryIO, size: int) -> None:
     """Refuse tables of texts and references in which HDF5 would go round for ever.
 
     HDF5 file format 3.0, III.E: 16 bytes of head with the size of the collection, then
     objects with 16 bytes of head each; number 0 is what is free, its head counted in.
     """
-    place = content.find(_HEAP)
-    while place >= 0:
-        end = place + int.from_bytes(content[place + 8 : place + 16], "little")
-        at = place + 16
-        while at + 16 <= min(end, len(content)):
-            number = int.from_bytes(content[at : at + 2], "little")
-            size = int.from_bytes(content[at + 8 : at + 16], "little")
-            step = 16 + -(-size // 8) * 8 if number else size
+    walked = 0
+    for place in _heaps(stream, size):
+        stream.seek(place + 8)
+        end = int.from_bytes(stream.read(8), "little") - 16
+        held = stream.read(max(min(end, size), 0))
+        at = 0
+        walked += len(held)
+        # They do not overlap
+        if walked > size:
+            raise DataFileError(path, "its table of texts is damaged", DAMAGED)
+        while at + 16 <= len(held):
+            number = int.from_bytes(held[at : at + 2], "little")
+            length = int.from_bytes(held[at + 8 : at + 16], "little")
+            step = 16 + -(-length // 8) * 8 if number else length
             if not 16 <= step <= end - at:
                 raise DataFileError(path, "its table of texts is damaged", DAMAGED)
             at += step
-        place = content.find(_HEAP, place + 4)
+
+
+def _heaps(stream: BinaryIO, size: int) -> Iterator[int]:
+    """Yield where tables of texts begin.
+
+    To compare words at four offsets takes half the time of a search for bytes.
+    """
+    for start in range(0, size, _BLOCK):
+        stream.seek(start)
+        block = stream.read(_BLOCK + len(_HEAP) - 1)
+        if len(block) < len(_HEAP):
+            return
+        words = (np.frombuffer(block, "<u4", (len(block) - k) // 4, k) for k in range(4))
+        if any((word == _WORD).any() for word in words):
+            place = block.find(_HEAP)
+            while place >= 0:
+                yield start + place
+                place = block.find(_HEAP, place + 4)
 
 
 def _check_group(path: str | Path, group: h5py.Group, size: int, depth: int = 0) -> None:
@@ -123,7 +155,7 @@ def _check_dataset(path: str | Path, name: str, item: h5py.Dataset, size: int) -
     places = set()
     # Its answer would end the search unless it is None
     item.id.chunk_iter(lambda chunk: places.add(chunk.chunk_offset))
-    inside = sum(all(np.less(offset, item.shape)) for offset in places)
+    inside = sum(all(map(lt, offset, item.shape)) for offset in places)
     if inside != expected:
         problem = f"it holds {inside} of {expected} pieces of its data"
         raise DataFileError(path, problem, DAMAGED, column=place)

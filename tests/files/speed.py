@@ -79,6 +79,10 @@ def main() -> None:
                 lambda: data_io.write_result(held, place / "c.nc"),
             ),
             "read a result, netCDF": (
+                lambda: plain_read(place / "b.nc"),
+                lambda: data_io.read_result(nc),
+            ),
+            "the same netCDF file": (
                 lambda: plain_read(nc),
                 lambda: data_io.read_result(nc),
             ),
@@ -87,6 +91,10 @@ def main() -> None:
                 lambda: data_io.write_result(held, place / "c.zarr"),
             ),
             "read a result, Zarr": (
+                lambda: xr.open_zarr(place / "b.zarr", chunks=None).load(),
+                lambda: data_io.read_result(zarr),
+            ),
+            "the same store": (
                 lambda: xr.open_zarr(zarr, chunks=None).load(),
                 lambda: data_io.read_result(zarr),
             ),

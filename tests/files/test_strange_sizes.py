@@ -33,6 +33,31 @@ def test_names_over_a_wide_map_are_read_in_linear_time(tmp_path):
     assert time.process_time() - begin < 5.0
 
 
+def test_tables_of_texts_within_one_another_are_refused_in_linear_time(tmp_path):
+    """Each of them is said to go on to the end of the file."""
+    path = tmp_path / "a.nc"
+    sizes = (2**40).to_bytes(8, "little"), (16).to_bytes(8, "little")
+    one = b"GCOL\1\0\0\0" + sizes[0] + b"\1" + bytes(7) + sizes[1]
+    path.write_bytes(b"\x89HDF\r\n\x1a\n" + 60_000 * one)
+    begin = time.process_time()
+    with pytest.raises(DataFileError, match="table of texts"):
+        read_result(path)
+    assert time.process_time() - begin < 2.0
+
+
+@pytest.mark.parametrize("suffix", [".sur", ".spm", ".dat"])
+@pytest.mark.parametrize("held", [bytes(8), b"abc def\n", b"abc def ", b"1 2 x 4\n"])
+def test_large_files_of_nothing_are_no_maps(tmp_path, held, suffix):
+    """They went to readers of tables, which read them some hundred times."""
+    pytest.importorskip("SurfaceTopography")
+    path = tmp_path / f"map{suffix}"
+    path.write_bytes(held * 500_000)
+    begin = time.process_time()
+    with pytest.raises(DataFileError, match="map"):
+        read_height_map(path)
+    assert time.process_time() - begin < 5.0
+
+
 @pytest.mark.parametrize(
     ("text", "cells"),
     [

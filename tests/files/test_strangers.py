@@ -1,6 +1,8 @@
 """Files from strangers: refused by name, soon, within memory; never believed too far."""
 
+import hashlib
 import io
+import json
 import os
 import time
 import warnings
@@ -114,6 +116,20 @@ def test_results_of_earlier_versions_are_read(tmp_path):
     path = tmp_path / "old.nc"
     small_result().assign_attrs(warnings="json:[]").to_netcdf(path, engine="h5netcdf")
     assert data_io.read_result(path).attrs["warnings"] == []
+
+
+def test_checksums_of_earlier_versions_are_compared(tmp_path):
+    """They are SHA-256, of dimensions, shape, kind, attributes and values."""
+    path, values = tmp_path / "old.nc", np.arange(12.0).reshape(3, 4)
+    for factor in (1.0, 1.0 + 1e-15):
+        head = b"('x', 'y') (3, 4) <f8 []\0"
+        held = {"a": hashlib.sha256(head + values.tobytes()).hexdigest()}
+        dataset = xr.Dataset({"a": (("x", "y"), factor * values)})
+        dataset.attrs["pbrdf_checksums"] = json.dumps(held)
+        dataset.to_netcdf(path, engine="h5netcdf")
+        if factor == 1.0:
+            np.testing.assert_array_equal(data_io.read_result(path).a, values)
+    assert "variable a: the values are not those" in refused(path)
 
 
 def test_data_that_lie_elsewhere_are_not_fetched(tmp_path):
