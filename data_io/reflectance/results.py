@@ -4,7 +4,6 @@ import json
 import math
 import warnings
 from collections.abc import Hashable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from data_io.reflectance.attributes import (
 from data_io.reflectance.result_store import read_store, write_store
 from data_io.text.files import read_bytes
 from pbrdf.errors import DataFileError
-from pbrdf.files import complete_file, file_size
+from pbrdf.files import complete_file
 from pbrdf.files.hdf5 import FAULTS, first_line, opened
 
 # Pieces of a variable; smaller ones take longer to read [bytes]
@@ -112,9 +111,7 @@ def read_result(path: str | Path) -> xr.Dataset:
     """
     if Path(path).suffix == ".zarr":
         return _plain_again(path, read_store(path))
-    if _start(path) != _HDF5_MAGIC:
-        # Says more of a file that cannot be read, or is empty
-        read_bytes(path)
+    if read_bytes(path, len(_HDF5_MAGIC)) != _HDF5_MAGIC:
         problem = "expected a netCDF 4 file, the content is something else"
         raise DataFileError(path, problem, "Give a result file (.nc) of this program.")
     try:
@@ -133,14 +130,6 @@ def read_result(path: str | Path) -> xr.Dataset:
         problem = f"expected a complete netCDF 4 file, got: {first_line(error)}"
         raise DataFileError(path, problem, "The file is truncated or damaged.") from error
     return _plain_again(path, dataset)
-
-
-def _start(path: str | Path) -> bytes:
-    """Return the first bytes of a regular file, none if it cannot be read."""
-    file_size(path)
-    with suppress(OSError), Path(path).open("rb") as stream:
-        return stream.read(len(_HDF5_MAGIC))
-    return b""
 
 
 def _plain_again(path: str | Path, dataset: xr.Dataset) -> xr.Dataset:

@@ -28,10 +28,10 @@ class NotAMapError(DataFileError):
         super().__init__(path, problem, "Read it with read_profile.")
 
 
-def read_bytes(path: str | Path) -> bytes:
-    """Return the content of a file that exists and is not empty."""
-    content = read_bounded(path)
-    if not content.strip():
+def read_bytes(path: str | Path, first: int | None = None) -> bytes:
+    """Return the content of a file that exists and is not empty, or its first bytes."""
+    content = read_bounded(path, first=first)
+    if not content.strip() and (first is None or len(content) < first):
         problem = "expected data, the file is empty"
         raise DataFileError(path, problem, "Export it again from its source.")
     return content

@@ -129,7 +129,7 @@ def _read_any(
     um_per_level: float | None,
 ) -> HeightMap:
     """Read a map of any format, as it is."""
-    content_start = read_bytes(path)[:8]
+    content_start = read_bytes(path, 8)
     suffix = path.suffix.lower()
     if um_per_level is not None:
         return _read_picture(path, spacing, unit, um_per_level)

@@ -1,11 +1,12 @@
 """One way to open a file: a regular one, of a size that is known before it is read."""
 
-import io
 import math
 import stat
 import tokenize
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -72,8 +73,10 @@ def file_size(path: str | Path, most: int = MOST_BYTES) -> int:
     return found.st_size
 
 
-def read_bounded(path: str | Path, most: int = MOST_BYTES) -> bytes:
-    """Return the content of a regular file of at most so many bytes.
+def read_bounded(
+    path: str | Path, most: int = MOST_BYTES, *, first: int | None = None
+) -> bytes:
+    """Return the content of a regular file of at most `most` bytes, or its first bytes.
 
     Raises
     ------
@@ -81,10 +84,16 @@ def read_bounded(path: str | Path, most: int = MOST_BYTES) -> bytes:
         As `file_size`, or if the file cannot be read.
     """
     size = file_size(path, most)
+    with _readable(path) as stream:
+        # A file that grows while it is read is read as it was
+        return stream.read(size if first is None else min(size, first))
+
+
+@contextmanager
+def _readable(path: str | Path) -> Iterator[BinaryIO]:
     try:
         with Path(path).open("rb") as stream:
-            # A file that grows while it is read is read as it was
-            return stream.read(size)
+            yield stream
     except OSError as error:
         problem = f"expected a readable file, got: {error.strerror}"
         raise DataFileError(path, problem, "Check path and permissions.") from error
@@ -115,24 +124,24 @@ def read_array(path: Path, most: int = MOST_BYTES) -> np.ndarray:
     DataFileError
         If it is no such file, or holds less than its header says, or objects.
     """
-    content = read_bounded(path, most)
+    size = file_size(path, most)
     cure = "Give an array of numbers as numpy.save writes it."
-    stream = io.BytesIO(content)
     try:
-        version = np.lib.format.read_magic(stream)
-        if version == (1, 0):
-            shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
-        else:
-            shape, _, dtype = np.lib.format.read_array_header_2_0(stream)
-        if dtype.hasobject or dtype.kind not in "biufc":
-            raise DataFileError(path, f"expected numbers, got {dtype}"[:200], cure)
-        expected = math.prod(shape) * dtype.itemsize
-        held = len(content) - stream.tell()
-        if expected > held or any(side < 0 for side in shape):
-            problem = f"its header promises {expected} bytes of data, it holds {held}"
-            raise DataFileError(path, problem, "The file is truncated or damaged.")
-        stream.seek(0)
-        return np.asarray(np.load(stream, allow_pickle=False))
+        with _readable(path) as stream:
+            version = np.lib.format.read_magic(stream)
+            if version == (1, 0):
+                shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
+            else:
+                shape, _, dtype = np.lib.format.read_array_header_2_0(stream)
+            if dtype.hasobject or dtype.kind not in "biufc":
+                raise DataFileError(path, f"expected numbers, got {dtype}"[:200], cure)
+            expected = math.prod(shape) * dtype.itemsize
+            held = size - stream.tell()
+            if expected > held or any(side < 0 for side in shape):
+                problem = f"its header promises {expected} bytes of data, it holds {held}"
+                raise DataFileError(path, problem, "The file is truncated or damaged.")
+            stream.seek(0)
+            return np.asarray(np.load(stream, allow_pickle=False))
     except DataFileError:
         raise
     except _FAULTS_OF_HEADERS as error:

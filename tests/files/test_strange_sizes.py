@@ -71,6 +71,16 @@ def test_separators_inside_brackets_separate_nothing(text, cells):
     assert _split_outside(",", text) == cells
 
 
+def test_blank_lines_before_a_map_are_no_empty_file(tmp_path):
+    path = tmp_path / "map.csv"
+    path.write_text(3000 * "\n" + "1,2,3\n4,5,6\n7,8,9\n")
+    assert read_height_map(path, spacing=1.0, unit="um").heights[0, 1] == 4.0
+    for size in (0, 3, 4000):
+        path.write_text(size * " ")
+        with pytest.raises(DataFileError, match="the file is empty"):
+            read_height_map(path, spacing=1.0)
+
+
 def test_readings_brighter_than_any_surface_are_refused(tmp_path):
     path = tmp_path / "scan.csv"
     path.write_text("theta_i_deg,theta_s_deg,dphi_deg,M00\n10,10,180,1e12\n10,20,180,2\n")

@@ -22,7 +22,7 @@ _RECORD = re.compile(r"^\s*EOR\s*$|\x03", re.MULTILINE)
 
 def is_measurement_standard(path: Path) -> bool:
     """Tell whether a file is of this kind, whatever its name."""
-    start = read_bytes(path)[:2000].decode("latin-1")
+    start = read_bytes(path, 2000).decode("latin-1")
     return {found[0] for found in _AXIS.findall(start)} == {"X", "Z"}
 
 

@@ -16,7 +16,7 @@ _NO_HEIGHT = 1e30
 
 def is_text_sdf(path: Path) -> bool:
     """Tell whether a file is SDF in text, whatever its name."""
-    return bool(_MAGIC.match(read_bytes(path)[:40]))
+    return bool(_MAGIC.match(read_bytes(path, 40)))
 
 
 def read_text_sdf(path: Path) -> HeightMap:
