@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from data_io.mending.comb import find_comb
+
 Array = np.ndarray
 
 # Fewer levels are a surface of steps, or one that was drawn
@@ -15,6 +17,10 @@ _ON_PLATEAUS = 0.25
 _MOST_LEVELS = 1000
 # Heights that a blurred rim may take between two plateaus
 _RIM = 12
+# Steps between the terraces of crystals are lower; pictures smear none so narrow [um]
+_LATTICE = 0.002
+# Heights of blurred rims can be as many as to pass for levels
+_COARSER = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,17 +34,33 @@ class Bands:
     edges : ndarray, shape (n + 1,)
         Between neighbouring levels, and half a band beyond the first and last. [um]
     equal : float
-        Share of neighbouring heights that are equal. [1]
+        Share of neighbouring heights that are equal, or of the same band if `smeared`. [1]
+    smeared : bool
+        Heights crowd at the levels, as in a picture that was blurred or got noise after
+        digitisation.
     """
 
     levels: Array
     edges: Array
     equal: float
+    smeared: bool = False
 
     @property
     def width(self) -> float:
         """Mean width of the bands. [um]"""
         return float(np.mean(np.diff(self.edges)))
+
+    @property
+    def may_be_real(self) -> bool:
+        """Whether they may be terraces of a crystal, measured with noise."""
+        return self.smeared and self.width < _LATTICE
+
+    def __str__(self) -> str:
+        words = "of one band, blurred or with noise" if self.smeared else "equal"
+        return (
+            f"{self.equal:.0%} of neighbouring heights are {words}, in "
+            f"{self.levels.size} bands of {self.width:.3g} um"
+        )
 
     def limits(self, heights: Array) -> tuple[Array, Array]:
         """Lowest and highest true height at every node, infinite where missing. [um]
@@ -46,7 +68,7 @@ class Bands:
         A height between two plateaus, as blur leaves it, counts to the nearer one.
         """
         known = np.isfinite(heights)
-        place = np.searchsorted(self.edges[1:-1], np.where(known, heights, 0.0))
+        place = _place(self.edges, np.where(known, heights, 0.0))
         low = np.where(known, self.edges[place], -np.inf)
         return low, np.where(known, self.edges[place + 1], np.inf)
 
@@ -74,7 +96,8 @@ def find_bands(heights: Array) -> Bands | None:
     """Find the levels of a terraced map; None if its heights are not in bands.
 
     A level is a height that neighbours share; a quarter of all heights must lie on levels,
-    of which there are at least six, and a tenth of all neighbours must be equal.
+    of which there are at least six, and a tenth of all neighbours must be equal. Where
+    blur or noise came after digitisation, levels are even, and heights crowd at them.
 
     Parameters
     ----------
@@ -92,6 +115,19 @@ def find_bands(heights: Array) -> Bands | None:
     known = heights[np.isfinite(heights)]
     if known.size < 100 or np.ptp(known) == 0:
         return None
+    sharp = _sharp_bands(heights, known)
+    comb = find_comb(heights)
+    if comb is None or comb.size < FEWEST_LEVELS:
+        return sharp
+    if sharp is not None and comb.size > _COARSER * sharp.levels.size:
+        return sharp
+    edges = _edges(comb)
+    equal = equal_neighbours(np.where(np.isfinite(heights), _place(edges, heights), np.nan))
+    return Bands(comb, edges, equal, smeared=True) if equal >= LEAST_EQUAL else None
+
+
+def _sharp_bands(heights: Array, known: Array) -> Bands | None:
+    """Find levels that heights take exactly."""
     equal = equal_neighbours(heights)
     if equal < LEAST_EQUAL:
         return None
@@ -145,6 +181,11 @@ def _between_plateaus(counts: Array, shared: Array) -> Array:
     lonelier = np.minimum(sides[0][1], sides[1][1]) > 2 * shared
     enough = np.minimum(sides[0][0], sides[1][0]) > counts + 10
     return np.asarray(enough & ((rarer > 4) | ((rarer > 1.5) & lonelier)))
+
+
+def _place(edges: Array, values: Array) -> Array:
+    """Return the band of each value."""
+    return np.searchsorted(edges[1:-1], values)
 
 
 def _nearest(levels: Array, values: Array) -> Array:

@@ -105,7 +105,8 @@ def mend(
                     missing
         offsets     independent offsets of the lines: taken off
         spikes      points twelve times further from their neighbours than usual: missing
-        terraces    bands of equal heights: the surface under them is drawn
+        terraces    bands of equal heights: the surface under them is drawn. Crowding at
+                    levels less than 2 nm apart may be a crystal's, and is left with ``all``
         ==========  ================================================================
     name : str
         Of the map, for the warning.
@@ -163,11 +164,10 @@ def mend(
     bands = find_bands(clean)
     if bands is not None:
         small = heights.size <= _MOST_NODES
-        text = (
-            f"{bands.equal:.0%} of neighbouring heights are equal, in "
-            f"{bands.levels.size} bands of {bands.width:.3g} um"
-        )
+        text = str(bands)
         done = "terraces" in wanted and small
+        if bands.may_be_real and wanted == set(KINDS):
+            text, done = f"{text}, which may be the terraces of a crystal", False
         where = np.isfinite(heights)
         mends.append(Mend("terraces", bands.levels.size, text, where, done))
         if done:

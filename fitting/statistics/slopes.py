@@ -150,7 +150,7 @@ def _without_bands(surface: Any) -> Array:
 
     heights = real_array("heights", surface.heights)
     bands = find_bands(heights)
-    if bands is None:
+    if bands is None or bands.may_be_real:
         return heights
     drawn = deterrace(HeightMap(heights, surface.spacing), bands=bands).surface.heights
     return np.where(np.isfinite(heights), drawn, np.nan)

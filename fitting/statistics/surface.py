@@ -181,15 +181,13 @@ def _under_uneven_bands(surface: MapLike) -> tuple[str, MapLike] | None:
 
     heights = real_array("heights", surface.heights)
     bands = find_bands(heights)
-    if bands is None or abs(find_step(heights) / bands.width - 1) < _SAME_STEP:
+    if bands is None or bands.may_be_real:
+        return None
+    if abs(find_step(heights) / bands.width - 1) < _SAME_STEP:
         return None
     dx, dy = np.broadcast_to(np.asarray(surface.spacing, dtype=float), (2,))
     drawn = deterrace(HeightMap(heights, (float(dx), float(dy))), bands=bands)
-    text = (
-        f"terraces: {bands.equal:.0%} of neighbouring heights are equal, in "
-        f"{bands.levels.size} bands of {bands.width:.3g} um; statistics are those of a "
-        "surface drawn between them"
-    )
+    text = f"terraces: {bands}; statistics are those of a surface drawn between them"
     holes = np.where(np.isfinite(heights), drawn.surface.heights, np.nan)
     return text, HeightMap(holes, drawn.surface.spacing)
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import ndimage
 
-from data_io import deterrace, find_bands
+from data_io import MendWarning, deterrace, find_bands, mend_map
 from pbrdf import GaussianSurface, HeightMap
 
 SHARES = np.arange(0.10, 0.951, 0.05)
@@ -118,9 +118,54 @@ def test_bands_of_a_blurred_picture_with_finer_colours():
     assert_allclose(slope_rms(found.surface.heights), slope_rms(true), rtol=0.03)
 
 
+SMEARED = [
+    (0.50, 9, 12, 0.7, 0.0, None),
+    (0.30, 12, 50, 0.7, 0.0, 256),
+    (0.40, 10, 24, 0.0, 0.08, None),
+]
+
+
+@pytest.mark.parametrize(("slope", "length", "bands", "blur", "noise", "colours"), SMEARED)
+def test_pictures_smeared_after_digitisation(slope, length, bands, blur, noise, colours):
+    true = random_surface(slope, length, bands)
+    raw, width = digitised(true, bands, 0.0, 3)
+    picture = ndimage.gaussian_filter(raw, blur) if blur else raw
+    picture = picture + noise * width * np.random.default_rng(6).standard_normal(raw.shape)
+    if colours is not None:
+        fine = np.ptp(true) / colours
+        picture = np.round(picture / fine) * fine
+    found = deterrace(HeightMap(picture, 1.0), seed=1)
+    assert found.bands.smeared
+    assert_allclose(found.bands.width, width, rtol=0.01)
+    mended = found.surface.heights
+    assert_allclose(slope_rms(mended), slope_rms(true), rtol=0.03)
+    wanted = np.quantile(np.abs(slopes(true)), SHARES)
+    assert_allclose(np.quantile(np.abs(slopes(mended)), SHARES), wanted, rtol=0.08)
+
+
+def test_terraces_of_a_crystal_are_named_and_left():
+    # Steps of 0.4 nm across a tilted face, and the noise of the microscope [um]
+    noise = 4e-5 * np.random.default_rng(2).standard_normal((120, 150))
+    wavy = np.add.outer(np.arange(120) / 9, np.sin(np.arange(150) / 20))
+    heights = 4e-4 * np.floor(wavy) + noise
+    crystal = HeightMap(heights, 0.01)
+    with pytest.warns(MendWarning, match="the terraces of a crystal; left as they are"):
+        assert_array_equal(mend_map(crystal).heights, heights)
+    with pytest.warns(MendWarning, match="the surface under them is drawn"):
+        assert np.any(mend_map(crystal, kinds="terraces").heights != heights)
+
+
+def lenslets():
+    """Eight levels that fall back from the last to the first, with noise."""
+    noise = 0.002 * np.random.default_rng(3).standard_normal((160, 160))
+    radius = np.hypot(*np.meshgrid(*2 * [np.arange(160) % 120 - 60]))
+    return 0.1 * np.floor(8 * (radius / 36 % 1)) + noise
+
+
 @pytest.mark.parametrize(
     "heights",
     [
+        lenslets(),
         np.random.default_rng(1).normal(size=(40, 40)),
         # Rounded far below the differences of neighbours
         np.random.default_rng(1).normal(size=(60, 60)).round(2),
