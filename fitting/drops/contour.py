@@ -162,6 +162,28 @@ def moved_to(drop: DropContour, given: np.ndarray) -> DropContour | None:
     )  # fmt: skip
 
 
+def narrowed(drop: DropContour, width: float) -> DropContour:
+    """Put a drop on a curved substrate on the chord of a base of another width.
+
+    The contour ends in the blurred corners, and its chord with it; the curves that are
+    fitted to the drop meet the substrate elsewhere.
+    """
+    old = float(drop.points[-1, 0] - drop.points[0, 0])
+    curvature = 2 * np.sin(drop.bend) / old
+    bend = float(np.arcsin(np.clip(curvature * width / 2, -0.9, 0.9)))
+    rise = float((np.cos(drop.bend) - np.cos(bend)) / curvature)
+    points = drop.points - [0, rise]
+    inside = points[:, 1] > 0
+    if np.count_nonzero(inside) < 2:
+        return drop
+    points = points[inside]
+    # Of the first and last points that are left
+    origin, axes = _frame(drop)
+    ends = origin + points[[0, -1], :1] * axes[0] + rise * axes[1]
+    baseline = np.stack([-ends[:, 1], ends[:, 0]], axis=1)
+    return replace(drop, points=points, baseline=baseline, bend=bend)
+
+
 def _substrate_tone(scene: Scene, drop: DropContour) -> float:
     """Median of the substrate beside the drop, just below the baseline; 0 out of sight."""
     origin, axes = _frame(drop)
@@ -170,6 +192,10 @@ def _substrate_tone(scene: Scene, drop: DropContour) -> float:
     below = np.arange(3 * drop.blur + 2, 6 * drop.blur + 8)
     along = np.concatenate([left - reach, right + reach])
     grid = np.stack(np.meshgrid(along, -below), axis=-1).reshape(-1, 2)
+    # A curved substrate falls or rises from the line between the contacts
+    ends = drop.points[[0, -1], 0]
+    apart = (grid[:, 0] - ends[0]) * (grid[:, 0] - ends[1])
+    grid[:, 1] += np.sin(drop.bend) / (ends[1] - ends[0]) * apart
     tones = scene.at(scene.part, origin + grid @ axes)
     return float(np.nanmedian(tones)) if np.isfinite(tones).any() else 0.0
 

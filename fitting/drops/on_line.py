@@ -6,11 +6,12 @@ import numpy as np
 from scipy import ndimage
 
 from fitting.drops.baseline import GIVEN_ERROR
+from fitting.drops.ground import fit_ground
 
 # A baseline leans less than this against the rows. [rad]
 MAX_LEAN = np.deg2rad(20)
-# A curved one turns less than this from end to end. [rad]
-MAX_TURN = np.deg2rad(35)
+# A curved one turns less than this from end to end: one of a fibre or a ball. [rad]
+MAX_TURN = np.deg2rad(80)
 # Pixels of finite size, and grey levels known to a hundredth of the contrast, each for drop
 # and substrate, leave a baseline no better known. [pixels], [blurs]
 OFFSET_FLOOR, LEVEL_ERROR = 0.03, 0.035
@@ -209,19 +210,10 @@ def _measure(
         if min(np.count_nonzero(side) for side in sides) < 8:
             return None
         ground = xy[sides[0] | sides[1]]
-        for _ in range(3):
-            curve = np.polyfit(ground[:, 0] - middle, ground[:, 1], order)
-            residual = ground[:, 1] - np.polyval(curve, ground[:, 0] - middle)
-            spread = 1.4826 * np.median(np.abs(residual)) + 0.02
-            ground = ground[np.abs(residual) < 3.5 * spread]
-        # Of a curved substrate the line between the contacts is the baseline
-        ends = np.polyval(curve, [-width / 2, width / 2])
-        slope, level = (ends[1] - ends[0]) / width, ends.mean()
-        bend = float(np.arctan(curve[0] * width)) if order == 2 else 0.0
-        # Neighbouring points share blur and roughness: one in ten is independent
-        count = max(len(ground) / 10, 3)
-        lean_stderr = spread / np.sqrt(count) / np.std(ground[:, 0])
-        offset_stderr = spread / np.sqrt(count) + OFFSET_FLOOR + LEVEL_ERROR * blur
+        line = fit_ground(ground, middle, width, order)
+        slope, level, bend = line.slope, line.level, line.bend
+        lean_stderr = line.slope_error
+        offset_stderr = line.level_error + OFFSET_FLOOR + LEVEL_ERROR * blur
     else:
         slope = (given[1, 1] - given[0, 1]) / (given[1, 0] - given[0, 0])
         level = given[0, 1] + slope * (middle - given[0, 0])

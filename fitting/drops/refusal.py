@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from fitting.drops.contour import find_drops
-from fitting.drops.shapes import ShapeFit
+from fitting.drops.shapes import ShapeFit, laplace_profile
 from pbrdf.errors import DataFileError
 
 # A drop, however uneven, is nearer than this to a Young-Laplace curve: of its whole
@@ -14,11 +14,13 @@ WHOLE_MISFIT = 0.06
 SIDE_MISFIT = 0.025
 # An interval wider than this says nothing. [rad]
 WIDEST = np.deg2rad(60)
+# Sides that meet at the top at more than this are those of a triangle. [rad]
+WIDEST_TOP = np.deg2rad(15)
 
 # Drop and image that turn less into each other may be one floating body. [rad]
 LEAST_KINK = np.deg2rad(12)
 
-_OTHER = "Crop to the drop (crop=), or give two points of its baseline (baseline=)."
+NO_DROP_CURE = "Crop to the drop (crop=), or give two points of its baseline (baseline=)."
 
 
 def why_no_drop(grey: np.ndarray, baseline: np.ndarray | None) -> tuple[str, str]:
@@ -47,7 +49,7 @@ def why_no_drop(grey: np.ndarray, baseline: np.ndarray | None) -> tuple[str, str
         if _stands(np.rot90(grey, quarters)):
             problem = f"{expected} one with its substrate on its {where}"
             return problem, "Turn the picture until the substrate is below the drop."
-    return f"{expected} none", _OTHER
+    return f"{expected} none", NO_DROP_CURE
 
 
 def _stands(grey: np.ndarray) -> bool:
@@ -103,7 +105,14 @@ def check_shape(
             "expected the smooth outline of a drop, found one that misses every drop by "
             f"{max(whole.rms, *(fit.rms for pair in sides for fit in pair)):.1f} pixels"
         )
-        raise DataFileError(name, problem, _OTHER)
+        raise DataFileError(name, problem, NO_DROP_CURE)
+    corner = _corner_at_top(points, sides)
+    if corner > WIDEST_TOP:
+        problem = (
+            "expected the smooth outline of a drop, found a corner of "
+            f"{np.rad2deg(corner):.0f} degrees at its top"
+        )
+        raise DataFileError(name, problem, NO_DROP_CURE)
     for side, (fit, _) in zip(("left", "right"), sides, strict=True):
         if not 0 <= fit.angle <= np.pi or 2 * 1.96 * fit.stderr > WIDEST:
             angle, error = np.rad2deg([fit.angle, fit.stderr])
@@ -111,7 +120,28 @@ def check_shape(
                 f"expected a contact angle of 0 to 180 degrees, got {angle:.0f} "
                 f"± {error:.0f} on the {side}"
             )
-            raise DataFileError(name, problem, _OTHER)
+            raise DataFileError(name, problem, NO_DROP_CURE)
+
+
+def _corner_at_top(points: np.ndarray, sides: list[tuple[ShapeFit, ShapeFit]]) -> float:
+    """Return the angle that both sides' Young-Laplace curves turn by where they meet. [rad]
+
+    A needle leaves a gap there; its middle counts.
+    """
+    top = int(np.argmax(points[:, 1]))
+    middle = float(points[top, 0])
+    if 0 < top < len(points) - 1:
+        gaps = np.diff(points[top - 1 : top + 2, 0])
+        middle += float(gaps[1] if gaps[1] > gaps[0] else -gaps[0]) / 2
+    turn = 0.0
+    for pair, mirror in zip(sides, (-1, 1), strict=True):
+        p = next(fit for fit in pair if np.isfinite(fit.bond_number)).parameters
+        x, _, angle = laplace_profile(p[3]).T
+        widest = int(np.argmax(x))
+        outward = (mirror * middle - p[0]) / p[2]
+        fall = np.interp(abs(outward), x[: widest + 1], angle[: widest + 1])
+        turn += float(np.sign(outward) * fall)
+    return turn
 
 
 def check_kink(name: str | Path, sides: list[ShapeFit]) -> None:

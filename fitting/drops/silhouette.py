@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from data_io.micrograph.levels import load_grey
 from fitting.drops.baseline import HIDDEN_OF_HEIGHT, HIDDEN_OF_WIDTH, with_hidden_foot
-from fitting.drops.contour import find_drops
+from fitting.drops.contour import find_drops, narrowed
 from fitting.drops.on_line import DropContour
-from fitting.drops.refusal import check_kink, check_shape, why_no_drop
+from fitting.drops.refusal import NO_DROP_CURE, check_kink, check_shape, why_no_drop
 from fitting.drops.shapes import ShapeFit, fit_arc, fit_laplace
 from fitting.estimate import Estimate
 from pbrdf.errors import DataFileError, require
@@ -235,19 +235,11 @@ def _fit_sides(
     drop: DropContour, origin: np.ndarray, name: str | Path, remarks: list[str]
 ) -> ContactAngle:
     """Fit both sides and put the result together."""
-    clear = drop.points[_clear_of_corners(drop)]
-    if len(clear) < LEAST_POINTS:
-        problem = (
-            f"expected a drop of at least {LEAST_POINTS} contour points clear of the "
-            f"blurred corners, got {len(clear)}"
-        )
-        raise DataFileError(name, problem, "Take the picture closer, or sharper.")
-    whole = fit_laplace(_thin(clear))
-    apex = int(np.argmax(clear[:, 1]))
-    sides = [clear[: apex + 1] * [-1, 1], clear[apex:][::-1]]
-    results = [
-        _fit_side(side, whole, mirror) for side, mirror in zip(sides, (-1, 1), strict=True)
-    ]
+    clear, whole, results = _curves(drop, name)
+    if drop.bend:
+        left, right = -results[0][0].contact, results[1][0].contact
+        drop = narrowed(drop, right - left)
+        clear, whole, results = _curves(drop, name)
     check_shape(name, clear, whole, [(fit, other) for fit, other, _ in results])
     if drop.mirrored:
         check_kink(name, [fit for fit, _, _ in results])
@@ -288,6 +280,33 @@ def _fit_sides(
         ),
         warnings=tuple(remarks),
     )
+
+
+def _curves(
+    drop: DropContour, name: str | Path
+) -> tuple[np.ndarray, ShapeFit, list[tuple[ShapeFit, ShapeFit, str]]]:
+    """Return the points clear of the corners, the curve through all, and both sides'."""
+    clear = drop.points[_clear_of_corners(drop)]
+    if len(clear) < LEAST_POINTS:
+        problem = (
+            f"expected a drop of at least {LEAST_POINTS} contour points clear of the "
+            f"blurred corners, got {len(clear)}"
+        )
+        raise DataFileError(name, problem, "Take the picture closer, or sharper.")
+    whole = fit_laplace(_thin(clear))
+    apex = int(np.argmax(clear[:, 1]))
+    sides = [clear[: apex + 1] * [-1, 1], clear[apex:][::-1]]
+    for side, points in zip(("left", "right"), sides, strict=True):
+        if len(points) < LEAST_POINTS / 3:
+            problem = (
+                "expected a drop whose top is between its ends, found "
+                f"{len(points)} points of its outline on the {side}"
+            )
+            raise DataFileError(name, problem, NO_DROP_CURE)
+    results = [
+        _fit_side(side, whole, mirror) for side, mirror in zip(sides, (-1, 1), strict=True)
+    ]
+    return clear, whole, results
 
 
 def _estimate(drop: DropContour, fit: ShapeFit, other: ShapeFit) -> Estimate:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy import ndimage
 from skimage import io
 
 from fitting import contact_angle
@@ -176,6 +177,33 @@ def test_on_a_curved_substrate_angles_are_with_its_tangents(seed):
     for side in (result.left, result.right):
         assert side.value == pytest.approx(degrees, abs=1)
         assert side.low < degrees < side.high
+
+
+@pytest.mark.parametrize(
+    ("seed", "degrees"), [(50015, 120.3), (50026, 154.3), (50031, 121.2), (50021, 157.3)]
+)
+def test_drops_on_a_fibre(seed, degrees):
+    """The substrate turns by up to 67 degrees across the picture, or by hardly any."""
+    rng = np.random.default_rng([seed, 7])
+    rng.uniform()
+    image, _ = photograph("curved substrate", np.deg2rad(degrees), rng)
+    result = contact_angle(image)
+    for side in (result.left, result.right):
+        assert side.value == pytest.approx(degrees, abs=1)
+        assert side.low < degrees < side.high
+
+
+@pytest.mark.parametrize(("left", "right"), [(70, 70), (40, 90)])
+def test_a_triangle_has_a_corner_at_its_top(left, right):
+    rows, columns = np.mgrid[:300, :400]
+    inside = (
+        rows - 140
+        > np.where(columns < 200, (200 - columns) / left, (columns - 200) / right) * 60
+    )
+    dark = (inside & (rows < 201)) | (rows > 199)
+    image = ndimage.gaussian_filter(np.where(dark, 20.0, 220.0), 2.0)
+    with pytest.raises(DataFileError, match=r"a corner of \d\d degrees at its top|misses"):
+        contact_angle(image.astype(np.uint8))
 
 
 def test_drops_cut_by_the_top_and_bottom_are_refused_by_side():
