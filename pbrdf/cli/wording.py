@@ -8,6 +8,8 @@ __all__ = ["in_options", "options_of"]
 
 # Units that an option names and its argument does not
 _UNITS = re.compile(r"-(um|deg|nm)$")
+# Options of a sensor, and the arguments of the library that they become
+_SENSOR = {"--view-zenith-deg": "theta_s", "--view-azimuth-deg": "phi_s"}
 
 
 def options_of(parameters: Iterable[Any]) -> dict[str, str]:
@@ -24,6 +26,8 @@ def options_of(parameters: Iterable[Any]) -> dict[str, str]:
         if parameter.param_type_name == "option" and option.startswith("--"):
             found[parameter.name] = option
             found[_UNITS.sub("", option)[2:].replace("-", "_")] = option
+            if option in _SENSOR:
+                found[_SENSOR[option]] = option
     return found
 
 

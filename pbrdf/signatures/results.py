@@ -91,8 +91,8 @@ class Result:
                 return SunlitResult(here.isel(theta_i=int(found[0])), theta, phi)
         msg = (
             f"theta_s must be an incident zenith of the result, {degrees} degrees, got "
-            f"{np.rad2deg(theta):.4g}. Simulate theta_i at the zeniths of the sensor; "
-            "for sunlight alone, that of the sun will do."
+            f"{np.rad2deg(theta):.4g}. Simulate incidence at the zeniths of the "
+            "sensor; for sunlight alone, that of the sun will do."
         )
         raise ValueError(msg)
 

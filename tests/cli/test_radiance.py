@@ -60,7 +60,7 @@ def test_a_model_under_sun_and_sky(folder: Path) -> None:
     assert main(["radiance", "model.toml", *place]) == 2
 
 
-def test_a_result_that_is_warm(folder: Path) -> None:
+def test_a_result_that_is_warm(folder: Path, capsys: pytest.CaptureFixture) -> None:
     quick = ["--n-rays", "1000", "--realizations", "8", "--phi-i-deg", "uniform"]
     assert (
         main(["simulate", "scene.toml", "--theta-i-deg", "50", "-o", "r.nc", *quick]) == 0
@@ -71,6 +71,8 @@ def test_a_result_that_is_warm(folder: Path) -> None:
     seen = read_result("seen.nc")
     assert_allclose(seen.radiance.sel(stokes="I"), 9.924, atol=1e-3)
     assert main(["radiance", "r.nc", *warm, "-o", "cold.csv"]) == 0
+    assert main(["radiance", "r.nc", *warm[:-1], "40", "-o", "no.csv"]) == 2
+    assert "--view-zenith-deg must be an incident zenith" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
