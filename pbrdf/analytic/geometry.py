@@ -54,7 +54,8 @@ def flat_geometry(
     shape : tuple of int
         The broadcast shape.
     columns : list of ndarray
-        Contiguous float64; of one element where phi_i or another array is a single number.
+        Contiguous float64, read-only; of one element where phi_i or another array is a
+        single number.
     """
     angles = [
         checked_zenith("theta_i", theta_i),
@@ -70,7 +71,18 @@ def flat_geometry(
         raise ValueError(msg) from None
     columns = [_flat(a, shape) for a in angles]
     columns += [a.reshape(1) if a.size == 1 else _flat(a, shape) for a in spare]
-    return shape, columns
+    return shape, [read_only(column) for column in columns]
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    """Return a view that nobody writes through.
+
+    Kernels are compiled once for arrays that may be written to and once more for others:
+    what they only read comes to them in one kind, however it was broadcast.
+    """
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def _flat(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:

@@ -22,6 +22,8 @@ MOST_CROSSED = 4e6
 # As many times more lines of entry points carry the directions of a source of some width
 LINES_OF_A_DISC = 4
 NO_LABELS = np.empty((0, 0), dtype=np.uint8)
+# As the labels of maps, so that one compiled kernel takes both
+NO_LABELS.flags.writeable = False
 
 
 def cone_rim(
