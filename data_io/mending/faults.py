@@ -264,7 +264,7 @@ def _offsets(heights: Array) -> _Found | None:
 
 
 def _spikes(heights: Array) -> _Found | None:
-    where = find_spikes(heights)
+    where = find_spikes(heights, in_bands=find_bands(heights) is not None)
     count = int(where.sum())
     if not count:
         return None

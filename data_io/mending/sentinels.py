@@ -2,7 +2,8 @@
 
 A sentinel is a value far from all other heights (-9999, 0 where heights are 50), or a
 patch of one value whose rim jumps as no other neighbours do. A spike is one point that
-leaves the plane of its neighbours by twelve times what is usual.
+leaves the plane of its neighbours by twelve times what is usual on the map, and five times
+what is nearby; the surface beside it bends the other way, as it does not at a resolved top.
 """
 
 import numpy as np
@@ -17,6 +18,7 @@ _JUMP = 5.0
 _SMALLEST_PATCH = 6
 _FEWEST_VALUES = 40
 _SPIKE = 12.0
+_SPIKE_NEARBY = 5.0
 # More spikes than this share, and than so many, are the texture itself
 _MOST_SPIKES = 0.005
 _FEW_SPIKES = 2
@@ -100,13 +102,16 @@ def _patch_value(heights: Array, missing: Array) -> float | None:
     return None
 
 
-def find_spikes(heights: Array) -> Array:
+def find_spikes(heights: Array, *, in_bands: bool = False) -> Array:
     """Find single points of a map that jumped.
 
     Parameters
     ----------
     heights : ndarray, shape (nx, ny)
         NaN where missing. [um]
+    in_bands : bool
+        The map was digitised from colours, of which patches may be misread: the points of
+        their rims count too.
 
     Returns
     -------
@@ -122,10 +127,10 @@ def find_spikes(heights: Array) -> Array:
         )
         filled = filled[tuple(nearest)]
     found = np.zeros(heights.shape, dtype=bool)
-    cross = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]]) / 4
+    sharp = found.copy()
     ring = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], dtype=bool)
     for _ in range(3):
-        away = filled - ndimage.convolve(filled, cross, mode="nearest")
+        away = _from_neighbours(filled)
         usual = _TO_RMS * float(np.median(np.abs(away[~missing])))
         if usual == 0:
             break
@@ -139,8 +144,26 @@ def find_spikes(heights: Array) -> Array:
         if not new.any():
             break
         found |= new
+        sharp |= new if in_bands else new & _stands_out(away, ring)
         filled = np.where(new, around, filled)
-    return _unless_texture(found)
+    return sharp & _unless_texture(found)
+
+
+def _stands_out(away: Array, ring: Array) -> Array:
+    """Tell which points leave their neighbours as no resolved top or edge does."""
+    beside = ndimage.convolve(away, ring / 8.0, mode="nearest") * np.sign(away)
+    nearby = ndimage.median_filter(np.abs(away), size=5, mode="nearest")
+    return (beside < 0) & (np.abs(away) > _SPIKE_NEARBY * nearby)
+
+
+def _from_neighbours(heights: Array) -> Array:
+    """Height of each point over the mean of its four neighbours. [um]
+
+    Beyond the edges the surface goes on as a plane, so that a slope there is none.
+    """
+    wide = np.pad(heights, 1, mode="reflect", reflect_type="odd")
+    across = wide[:-2, 1:-1] + wide[2:, 1:-1] + wide[1:-1, :-2] + wide[1:-1, 2:]
+    return heights - across / 4
 
 
 def find_spikes_along(x: Array, values: Array) -> Array:

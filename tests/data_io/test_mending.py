@@ -87,6 +87,13 @@ def test_faults_are_named_counted_and_mended(heights, kind, count, text):
 
 GROOVES = np.sin(np.arange(160) / 5.0) * np.ones((160, 1))
 WALK = np.cumsum(0.1 * RNG.choice([-1, 1], size=(160, 160)), axis=0)
+X, Y = np.mgrid[:160, :160]
+PARTICLES = sum(
+    3 * np.exp(-((X - a) ** 2 + (Y - b) ** 2) / (2 * 1.2**2))
+    for a, b in RNG.uniform(5, 155, (9, 2))
+)
+SCRATCH = np.where(np.abs(X + Y / 2 - 110) < 1.5, -2.0, 0.0)
+HONED = np.minimum(TRUE, np.quantile(TRUE, 0.7))
 EDGE = np.where(np.add.outer(np.arange(160), np.arange(160)) > 170, 3.0, 0.0)
 
 
@@ -106,6 +113,13 @@ EDGE = np.where(np.add.outer(np.arange(160), np.arange(160)) > 170, 3.0, 0.0)
         np.add.outer(0.1 * np.arange(60), 0.2 * np.arange(60)),
         np.zeros((40, 40)),
         np.exp(TRUE),
+        # Smooth, with much steeper edges than inside is curved
+        surface(1, n=200, length=20.0) + 0.5 * np.arange(200),
+        np.exp(0.8 * surface(2, length=12.0)),
+        surface(3) ** 3,
+        PARTICLES + 0.05 * TRUE + NOISE,
+        SCRATCH + 0.1 * TRUE + NOISE,
+        HONED,
     ],
 )
 def test_sound_surfaces_are_left_alone(heights):
@@ -113,6 +127,14 @@ def test_sound_surfaces_are_left_alone(heights):
         warnings.simplefilter("error")
         found = mend_map(HeightMap(heights, 1.0))
     assert not isinstance(found, MendedMap)
+
+
+def test_a_needle_makes_no_line_lost():
+    z = 0.05 * TRUE + NOISE
+    z[40:42, 70] += 3
+    with pytest.warns(MendWarning, match="2 of 25600 heights jump"):
+        mended = mend_map(HeightMap(z, 1.0))
+    assert_array_equal(np.argwhere(np.isnan(mended.heights)), [[40, 70], [41, 70]])
 
 
 def test_terraces_are_drawn_with_their_uncertainty():
