@@ -27,6 +27,7 @@ from data_io.text.files import NotAMapError
 from data_io.text.units import MissingUnitWarning
 from data_io.topography.channels import ChannelWarning
 from data_io.topography.height_map import read_height_map
+from data_io.topography.height_text import CoordinatesWarning
 from data_io.topography.mesh_map import OverhangWarning
 from data_io.topography.plausible import ScaleWarning
 from data_io.topography.profile import MendedProfile, Profile
@@ -41,6 +42,7 @@ __all__ = [
     "Bands",
     "ChannelWarning",
     "ConventionWarning",
+    "CoordinatesWarning",
     "Deterraced",
     "EdgeProfile",
     "Mend",

@@ -69,7 +69,7 @@ def _far_value(known: Array) -> float | None:
         low, middle, high = np.quantile(rest, [0.005, 0.5, 0.995])
         reach = max(high - middle, middle - low)
         gap = np.abs(rest - value).min()
-        if abs(value - middle) > _FAR * reach and gap > reach > 0:
+        if abs(value - middle) / _FAR > reach and gap > reach > 0:
             return value
     return None
 

@@ -42,11 +42,17 @@ ANGLE_UNITS = {
     "arcmin": math.pi / 10_800,
     "arcsec": math.pi / 648_000,
 }
+# Sizes of the units of slopes that are lengths over lengths. [1]
+RATIO_UNITS = {
+    f"{rise}/{run}": LENGTH_UNITS[rise] / LENGTH_UNITS[run]
+    for rise in ("nm", "um", "mm", "m")
+    for run in ("nm", "um", "mm", "m")
+}
 _SPELLED = re.compile(r"^(nano|micro|milli|)(met(?:er|re)|rad(?:ian)?)s?$")
 _SHORT = {"nano": "n", "micro": "u", "milli": "m", "": ""}
 _OTHER_UNITS = {
     "px", "pixel", "pixels", "v", "mv", "s", "ms", "a.u.", "au", "arb. units", "in",
-    "counts", "cts", "%", "°c", "hz", "um/mm", "nm/mm", "um/m",
+    "counts", "cts", "%", "°c", "hz",
 }  # fmt: skip
 
 _NAME = r"([A-Za-zµμÅå]+)"
@@ -91,7 +97,7 @@ def unit_factor(name: str) -> float:
 
 
 def unit_kind(name: str) -> str:
-    """Tell what a unit measures: ``length``, ``angle``, ``other``; empty if unknown.
+    """Tell what a unit measures: ``length``, ``angle``, ``ratio``, ``other``, or nothing.
 
     Examples
     --------
@@ -99,13 +105,18 @@ def unit_kind(name: str) -> str:
     ('length', 'angle', 'other', '')
     """
     key = normalise_unit(name)
-    kinds = {"length": LENGTH_UNITS, "angle": ANGLE_UNITS, "other": _OTHER_UNITS}
+    kinds = {
+        "length": LENGTH_UNITS, "angle": ANGLE_UNITS, "ratio": RATIO_UNITS,
+        "other": _OTHER_UNITS,
+    }  # fmt: skip
     return next((kind for kind, units in kinds.items() if key in units), "")
 
 
 def unit_size(name: str) -> float:
-    """Return the size of a unit of length [um] or of angle [rad]."""
+    """Return the size of a unit of length [um], of angle [rad] or of a ratio [1]."""
     key = normalise_unit(name)
+    if key in RATIO_UNITS:
+        return RATIO_UNITS[key]
     return ANGLE_UNITS[key] if key in ANGLE_UNITS else unit_factor(name)
 
 

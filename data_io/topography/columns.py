@@ -25,6 +25,8 @@ Columns = str | Sequence[str | int]
 _NO_HEIGHTS = re.compile(
     r"\b(slopes?|gradients?|steigung|neigung|intensity|[uµμnm]rad|arcsec)\b", re.IGNORECASE
 )
+# What units of slopes measure
+SLOPES = ("angle", "ratio")
 ASK = "Say which columns hold position and height by columns='1,2'."
 
 
@@ -38,7 +40,7 @@ class ProfileColumns:
     @property
     def is_slope(self) -> bool:
         """Whether the values are slopes, by their name or by their unit."""
-        return self.value.role == "slope" or self.value.kind == "angle"
+        return self.value.role == "slope" or self.value.kind in SLOPES
 
 
 def profile_columns(
@@ -90,6 +92,8 @@ def _named(path: str | Path, columns: list[Column], line: int | None) -> Profile
     """Choose position and value among columns with names."""
     kept = [c for c in columns if c.role not in ("index", "other")]
     heights = [c for c in kept if c.role == "z"]
+    # Of several, those in counts or volts are none
+    heights = [c for c in heights if c.kind != "other"] or heights
     slopes = [c for c in kept if c.role == "slope"]
     sides = {axis: [c for c in kept if c.role == axis] for axis in ("x", "y")}
     if not heights and not slopes and sides["x"] and sides["y"]:
@@ -128,14 +132,14 @@ def _named(path: str | Path, columns: list[Column], line: int | None) -> Profile
 
 def _check_units(path: str | Path, chosen: ProfileColumns, line: int | None) -> None:
     """Refuse units that contradict what the names say."""
-    wanted = {"slope": ("angle", "a unit of angle, such as urad")}
-    length = ("length", "a length unit")
+    wanted = {"slope": (SLOPES, "a unit of angle, such as urad")}
+    length = (("length",), "a length unit")
     pairs = [(chosen.value, wanted.get(chosen.value.role, length))]
     if chosen.position is not None:
         pairs.insert(0, (chosen.position, length))
-    for column, (kind, words) in pairs:
-        angles = column is chosen.value and column.role != "z" and column.kind == "angle"
-        if column.unit and column.kind != kind and not angles:
+    for column, (kinds, words) in pairs:
+        slopes = column is chosen.value and column.role != "z" and column.kind in SLOPES
+        if column.unit and column.kind not in kinds and not slopes:
             problem = f"expected {words}, got {column.unit!r}"
             cure = "Convert the column and head it with its unit, or choose by columns=."
             raise DataFileError(path, problem, cure, line=line, column=column.name)
@@ -188,8 +192,10 @@ def column_sizes(
     header: list[Line],
     unit: str | tuple[str, str] | None,
     chosen: ProfileColumns,
-) -> tuple[float, float, bool]:
-    """Return the size of the units of x [um] and of z [um] or slope [rad], and which.
+) -> tuple[float, float, str]:
+    """Return the size of the units of x [um] and of z [um] or slope, and what that is.
+
+    It is ``length``, or for slopes ``angle`` [rad] or ``ratio`` [1].
 
     Raises
     ------
@@ -202,7 +208,8 @@ def column_sizes(
     if not any(named):
         named = stated_units(path, header)
     pair = named if unit is None else _given_units(path, unit, named, line)
-    is_slope = value.role == "slope" or unit_kind(pair[1] or "") == "angle"
+    kind = unit_kind(pair[1] or "")
+    is_slope = value.role == "slope" or kind in SLOPES
     _check_kinds(path, pair, value, is_slope=is_slope, line=line)
     missing = [name is None for name in pair]
     if position is None:
@@ -213,7 +220,8 @@ def column_sizes(
         raise DataFileError(path, problem, cure, line=line)
     if all(missing):
         warn_missing_unit(path, stacklevel=6)
-    return unit_size(pair[0] or "um"), unit_size(pair[1] or "um"), is_slope
+    sizes = unit_size(pair[0] or "um"), unit_size(pair[1] or "um")
+    return *sizes, kind if is_slope else "length"
 
 
 def _given_units(
@@ -242,13 +250,16 @@ def _check_kinds(
     line: int | None,
 ) -> None:
     """Refuse positions in radians, slopes in micrometres, heights in radians."""
-    if unit_kind(pair[0] or "") == "angle":
+    if unit_kind(pair[0] or "") in SLOPES:
         problem = f"expected positions in a length unit, got {pair[0]!r}"
         raise DataFileError(path, problem, ASK, line=line)
-    angle = unit_kind(pair[1] or "") == "angle"
+    angle = unit_kind(pair[1] or "") in SLOPES
     if is_slope and not angle:
         problem = f"expected slopes in a unit of angle, got {pair[1] or 'none'}"
-        cure = "Head the column, for example slope_urad, or give unit=('mm', 'urad')."
+        cure = (
+            "Head the column, for example slope_urad, or give unit=('mm', 'urad'), for "
+            "plain ratios unit=('mm', 'mm/mm')."
+        )
         raise DataFileError(path, problem, cure, line=line, column=value.name)
     if value.role == "z" and angle:
         problem = f"expected heights in a length unit, got {pair[1]!r}"

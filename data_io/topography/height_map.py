@@ -85,6 +85,8 @@ def read_height_map(
     -----
     ChannelWarning
         If an instrument's file has several channels of lengths; it names the one taken.
+    CoordinatesWarning
+        If the first row or column of a matrix rises evenly: it is left out.
     MendWarning
         For every kind of fault in the heights.
     OverhangWarning

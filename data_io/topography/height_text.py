@@ -1,6 +1,8 @@
 """Height maps in text files: matrices, and lists of x, y, z."""
 
+import warnings
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,13 @@ from data_io.topography.plausible import with_spacing
 from pbrdf.errors import DataFileError
 from pbrdf.surface.heightmap import HeightMap
 
+# A map of fewer rows or columns is too small to tell what they are
+_FEWEST_LINES = 8
 Spacing = float | tuple[float, float]
+
+
+class CoordinatesWarning(UserWarning):
+    """A first row or column of a matrix was taken for positions, and not for heights."""
 
 
 def known_steps(path: Path, spacing: Spacing | None) -> tuple[float, float]:
@@ -63,7 +71,7 @@ def read_text_map(
     block: int | None = None,
 ) -> HeightMap:
     """Read a matrix of heights, or a list of x, y, z."""
-    header, data = split_header(path, block)
+    header, data = _one_of(path, block)
     if header and header[0].text.startswith("Zygo"):
         problem = "expected positions in a unit of length, a file of Zygo's counts pixels"
         raise DataFileError(
@@ -88,6 +96,7 @@ def read_text_map(
     rows = read_numbers(
         path, data, gaps=True, columns=None if width == full else range(width)
     )
+    rows = _without_coordinates(path, rows)
     steps, factor = matrix_header(path, header, rows.shape)
     # Three columns of unknown spacing are no map but x, y, z
     if rows.shape[1] == 3 and steps is None and spacing is None:
@@ -104,6 +113,62 @@ def read_text_map(
     if factor is None and unit is None:
         warn_missing_unit(path, stacklevel=6, example="# unit = nm")
     return found_map
+
+
+def _one_of(path: Path, block: int | None) -> tuple[list[Line], Rows]:
+    """Return header and data of one map, of those that follow each other in a file."""
+    try:
+        header, data = split_header(path)
+    except DataFileError:
+        return split_header(path, block)
+    numbers = np.asarray(data.numbers)
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(numbers) > 1) + 1, [numbers.size]])
+    lengths = np.diff(starts)
+    alike = lengths.size > 1 and lengths.min() == lengths.max() >= _FEWEST_LINES
+    # Lists have such gaps between their scans
+    if not alike or table_width(data) < _FEWEST_LINES:
+        return (header, data) if block is None else split_header(path, block)
+    if block is None:
+        places = ", ".join(
+            f"lines {numbers[a]} to {numbers[b - 1]}" for a, b in pairwise(starts[:7])
+        )
+        problem = f"expected one map, found {lengths.size} of equal size: {places}"
+        raise DataFileError(path, problem, "Choose one by block=1.")
+    if block > lengths.size:
+        problem = f"expected a block of data from 1 to {lengths.size}, got {block}"
+        raise DataFileError(path, problem, "Choose another by block=.")
+    chosen = slice(starts[block - 1], starts[block])
+    return header, Rows(data.numbers[chosen], data.texts[chosen])
+
+
+def _without_coordinates(path: Path, rows: np.ndarray) -> np.ndarray:
+    """Leave out a first row or column that counts evenly, as no heights do, with a word."""
+    if min(rows.shape) < _FEWEST_LINES:
+        return rows
+    left, top = _counts(rows.T), _counts(rows)
+    if not (left or top):
+        return rows
+    named = ["first column"] * left + ["first row"] * top
+    lines = f"values of the {' and of the '.join(named)}"
+    step = rows[2, 0] - rows[1, 0] if left else rows[0, 2] - rows[0, 1]
+    warnings.warn(
+        f"{path.name}: {lines} rise or fall evenly, by {step:g}: taken for positions or "
+        "numbers of lines, not for heights.",
+        CoordinatesWarning,
+        stacklevel=5,
+    )
+    return rows[int(top) :, int(left) :]
+
+
+def _counts(rows: np.ndarray) -> bool:
+    """Tell whether the first row rises or falls evenly, and no other does."""
+    # The corner belongs to either
+    steps = np.diff(rows[:, 1:], axis=1)
+    known = np.isfinite(steps).all(axis=1)
+    steps = np.where(known[:, None], steps, 0.0)
+    apart = np.abs(steps - steps[:, :1]).max(axis=1)
+    even = known & (apart <= 1e-6 * np.abs(steps).mean(axis=1))
+    return bool(even[0] and steps[0, 0] != 0 and not even[1:].any())
 
 
 def _axes(columns: list[Column] | None) -> list[Column] | None:

@@ -23,7 +23,7 @@ def read_text_profile(
     header, data = split_header(path, block)
     chosen = profile_columns(path, header, data, columns, unit_given=unit is not None)
     used = [c for c in (chosen.position, chosen.value) if c is not None]
-    if chosen.position is None and chosen.value.kind == "angle":
+    if chosen.position is None and chosen.is_slope:
         problem = "expected positions beside slopes, found none"
         raise DataFileError(path, problem, "Export them with their positions.")
     names = [""] * (max(c.place for c in used) + 1)
@@ -31,9 +31,9 @@ def read_text_profile(
         names[column.place] = column.name or axis
     # The first column alone may end a row; blanks are gaps
     rows = read_numbers(path, data, names, gaps=True, columns=[c.place for c in used])
-    size_x, size_z, is_slope = column_sizes(path, header, unit, chosen)
+    size_x, size_z, kind = column_sizes(path, header, unit, chosen)
     value = rows[:, -1] * size_z
-    if is_slope:
+    if kind == "angle":
         value = np.tan(value)
     if chosen.position is None:
         x = np.arange(value.size) * _step(path, header, spacing)
@@ -45,7 +45,9 @@ def read_text_profile(
         x = even_positions(rows[:, 0] * size_x, place * size_x)
     known = np.isfinite(value) | ~np.isfinite(x)
     lines = [line for line, kept in zip(data.numbers, known, strict=True) if kept]
-    return build_profile(path, x[known], value[known], lines=lines, is_slope=is_slope)
+    return build_profile(
+        path, x[known], value[known], lines=lines, is_slope=kind != "length"
+    )
 
 
 def _step(path: str | Path, header: list[Line], spacing: float | None) -> float:

@@ -10,6 +10,8 @@ __all__ = ["in_options", "options_of"]
 _UNITS = re.compile(r"-(um|deg|nm)$")
 # Options of a sensor, and the arguments of the library that they become
 _SENSOR = {"--view-zenith-deg": "theta_s", "--view-azimuth-deg": "phi_s"}
+# A pair of words behind an option is typed with a comma
+_PAIR = re.compile(r"(--[\w-]+) \('([^']+)', '([^']+)'\)")
 
 
 def options_of(parameters: Iterable[Any]) -> dict[str, str]:
@@ -39,6 +41,8 @@ def in_options(sentence: str, options: Mapping[str, str]) -> str:
     >>> options = {"spacing": "--spacing-um"}
     >>> in_options("spacing must be > 0 um, got -1. Pass spacing=0.5.", options)
     '--spacing-um must be > 0 um, got -1. Pass --spacing-um 0.5.'
+    >>> in_options("Give spacing=('1', '2').", options)
+    'Give --spacing-um 1,2.'
     >>> in_options("Or: --columns x=ignore.", {"scan_columns": "--scan-columns"})
     'Or: --scan-columns x=ignore.'
     """
@@ -51,4 +55,4 @@ def in_options(sentence: str, options: Mapping[str, str]) -> str:
         sentence = re.sub(rf"(?<![\w-]){name}=", option, sentence)
         sentence = re.sub(rf"^{name} must\b", f"{option} must", sentence)
         sentence = re.sub(rf"--{name.replace('_', '-')}(?![\w-])", option, sentence)
-    return sentence
+    return _PAIR.sub(r"\1 \2,\3", sentence)

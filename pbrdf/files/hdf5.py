@@ -59,7 +59,7 @@ def opened(path: str | Path) -> Iterator[h5py.File]:
     try:
         with Path(path).open("rb") as stream:
             _check_heaps(path, stream, size)
-        file = h5py.File(path, "r", locking=False)
+        file = _open(path)
     except DataFileError:
         raise
     except FAULTS as error:
@@ -75,6 +75,16 @@ def opened(path: str | Path) -> Iterator[h5py.File]:
             cure = "The file is truncated or damaged."
             raise DataFileError(path, problem, cure) from error
         yield file
+
+
+def _open(path: str | Path) -> h5py.File:
+    """Open a file without a lock, or as another reader of this process has it open."""
+    try:
+        return h5py.File(path, "r", locking=False)
+    except OSError as error:
+        if "locking flag" not in str(error):
+            raise
+        return h5py.File(path, "r")
 
 
 def _check_heaps(path: str | Path, stream: BinaryIO, size: int) -> None:

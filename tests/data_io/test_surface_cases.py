@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from data_io import (
+    CoordinatesWarning,
     MendedMap,
     MendedProfile,
     MendWarning,
@@ -164,9 +165,75 @@ def test_slopes_by_the_units_given_and_from_right_to_left(tmp_path):
         # dz/dx is the tangent of the angle
         assert_allclose(profile.slope, np.tan([0.1, 0.3, 0.1]))
         assert_allclose(profile.x, [0, 1000, 3000])
-        assert_allclose(np.diff(profile.z), np.tan(0.1) + np.tan(0.3), rtol=2000)
         steps = np.diff(profile.x) * (np.tan(0.1) + np.tan(0.3)) / 2
         assert_allclose(np.diff(profile.z), steps)
+
+
+@pytest.mark.parametrize(
+    ("unit", "size"), [("um/um", 1), ("um/m", 1e-6), ("nm/mm", 1e-6), ("mm/m", 1e-3)]
+)
+def test_slopes_that_are_ratios_are_no_angles(tmp_path, unit, size):
+    path = write(tmp_path, f"x [mm],slope [{unit}]\n" + rows("{x},{z}"))
+    assert_allclose(read_profile(path).slope, [z * size for _, z in ROWS])
+    plain = write(tmp_path, "x_mm,gradient\n" + rows("{x},{z}"))
+    with pytest.raises(DataFileError, match=r"for plain ratios unit=\('mm', 'mm/mm'\)"):
+        read_profile(plain)
+    assert_allclose(read_profile(plain, unit=("mm", unit)).slope[0], 1.5 * size)
+
+
+def test_of_several_heights_those_in_counts_are_none(tmp_path):
+    path = write(tmp_path, "x[um] raw[counts] z[um]\n" + rows("{x} 77 {z}"))
+    assert_allclose(read_profile(path).z, [z for _, z in ROWS])
+
+
+MATRIX = np.random.default_rng(5).normal(size=(12, 9)).round(3)
+
+
+def matrix(values):
+    return "\n".join(",".join(f"{v:g}" for v in row) for row in values)
+
+
+@pytest.mark.parametrize("left", [True, False])
+@pytest.mark.parametrize("top", [True, False])
+def test_positions_beside_a_matrix_are_no_heights(tmp_path, left, top):
+    values = MATRIX
+    if top:
+        values = np.concatenate([[0.5 * np.arange(9)], values])
+    if left:
+        down = np.arange(len(values))[::-1, None] * 2.0
+        values = np.concatenate([down, values], axis=1)
+    path = write(tmp_path, matrix(values))
+    options = {"spacing": 0.5, "unit": "um"}
+    if not left and not top:
+        assert_allclose(read_height_map(path, **options).heights.T, MATRIX)
+        return
+    with pytest.warns(CoordinatesWarning, match="positions or numbers of lines"):
+        found = read_height_map(path, **options)
+    assert_allclose(found.heights.T, MATRIX)
+
+
+def test_a_plane_and_a_stair_have_no_column_of_positions(tmp_path):
+    for values in (
+        np.add.outer(np.arange(12), 2 * np.arange(9)),
+        np.repeat(np.arange(12)[:, None] // 3, 9, axis=1) + MATRIX,
+    ):
+        found = read_height_map(write(tmp_path, matrix(values)), spacing=1.0, unit="um")
+        assert_allclose(found.heights.T, values)
+
+
+def test_maps_that_follow_each_other_are_chosen_by_block(tmp_path):
+    text = f"# forwards\n{matrix(MATRIX)}\n\n# backwards\n{matrix(-MATRIX)}\n"
+    path = write(tmp_path, text)
+    options = {"spacing": 0.5, "unit": "um"}
+    with pytest.raises(
+        DataFileError, match=r"found 2 of equal size: lines 2 to 13, .*block="
+    ):
+        read_height_map(path, **options)
+    for block, sign in ((1, 1), (2, -1)):
+        found = read_height_map(path, block=block, **options)
+        assert_allclose(found.heights.T, sign * MATRIX)
+    with pytest.raises(DataFileError, match="block of data from 1 to 2, got 3"):
+        read_height_map(path, block=3, **options)
 
 
 def test_lists_of_maps_have_further_columns_too(tmp_path):
@@ -197,6 +264,15 @@ def test_the_command_line_takes_columns_units_and_blocks(tmp_path, capsys):
 
 def heights_of(path, **options):
     return read_height_map(path, **options).heights
+
+
+def test_a_file_that_is_open_elsewhere_is_not_called_damaged():
+    import h5py
+
+    options = {"spacing": 0.5, "unit": "um"}
+    with h5py.File(CASES / "height.h5", "r"):
+        once = heights_of(CASES / "height.h5", **options)
+    assert_allclose(heights_of(CASES / "height.h5", **options), once)
 
 
 def test_instruments_meshes_pictures_and_arrays_hold_one_map():
