@@ -166,8 +166,8 @@ def _counts(rows: np.ndarray) -> bool:
     steps = np.diff(rows[:, 1:], axis=1)
     known = np.isfinite(steps).all(axis=1)
     steps = np.where(known[:, None], steps, 0.0)
-    apart = np.abs(steps - steps[:, :1]).max(axis=1)
-    even = np.asarray(known & (apart <= 1e-6 * np.abs(steps).mean(axis=1)))
+    apart: np.ndarray = np.abs(steps - steps[:, :1]).max(axis=1)
+    even = np.logical_and(known, apart <= 1e-6 * np.abs(steps).mean(axis=1))
     return bool(even[0] and steps[0, 0] != 0 and not even[1:].any())
 
 
