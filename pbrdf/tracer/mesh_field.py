@@ -95,7 +95,7 @@ def scene_flags(surface: MeshSurface) -> int:
     In a closed opaque body it meets a back next, or falls through the ground, and is
     traced again.
     """
-    quick = surface.kind != "sheet" and surface.parts == 1 and not surface.transparent
+    quick = surface.kind != "sheet" and not surface.intersecting and not surface.transparent
     return SCENE_ASKS_BACK | (0 if quick else SCENE_ROBUST)
 
 
@@ -170,7 +170,7 @@ class MeshField:
         period = surface.period or (np.inf, np.inf)
         frame = kernel.MeshFrame(
             kind=KINDS[surface.kind],
-            crossing=surface.parts > 1,
+            crossing=surface.intersecting,
             periodic=surface.period is not None,
             period_x=period[0],
             period_y=period[1],

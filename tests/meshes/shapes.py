@@ -64,6 +64,24 @@ def corner_cube(edge=2.0):
     return np.array([[0.0, 0.0, 0.0], *rim]), np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1]])
 
 
+def bent_tube(steps=48, sides=7):
+    """A closed tube along an eight, which cuts through itself in the middle."""
+    t = np.linspace(0.0, 2 * np.pi, steps, endpoint=False)
+    path = np.stack([3 * np.sin(2 * t), 3 * np.sin(t), 0.2 * np.cos(t)], axis=1)
+    along = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    across = np.cross([0.0, 0.0, 1.0], along)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    up = np.cross(along, across)
+    angle = 0.1 + 2 * np.pi * np.arange(sides)[:, None, None] / sides
+    ring = path + 0.5 * (np.cos(angle) * across + np.sin(angle) * up)
+    number = np.arange(sides * steps).reshape(sides, steps)
+    a, b = number, np.roll(number, -1, axis=0)
+    c, d = np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)
+    faces = [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+    return ring.reshape(-1, 3), np.concatenate(faces)
+
+
 def mushrooms(period=(6.0, 5.0)):
     """A plate with a sphere on a thin stem and a torus in the air across the seam."""
     ball = trimesh.creation.icosphere(subdivisions=2, radius=1.1)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from pbrdf.errors import AccuracyWarning, DataFileError, require
 from pbrdf.surface.heightmap import HeightMap
+from pbrdf.surface.mesh.crossings import check_crossings
 from pbrdf.surface.mesh.mending import (
     checked_arrays,
     mend,
@@ -62,6 +63,9 @@ class MeshSurface:
         nothing under them; or an open sheet.
     parts : int
         Number of parts that hang together.
+    intersecting : bool
+        Whether facets may cut through each other: there are several parts, or one cuts
+        through itself or its images.
     transparent : tuple of int
         Labels of the solids that light goes through.
     solids : ndarray of int, shape (faces,), or None
@@ -70,7 +74,8 @@ class MeshSurface:
     solid_labels : tuple of int
         Label of each of these solids.
     repairs : tuple of str
-        What was mended, with counts and places; each is also a warning.
+        What was mended, and where a part cuts through itself, with counts and places; each
+        is also a warning.
 
     Raises
     ------
@@ -101,6 +106,7 @@ class MeshSurface:
     kind: str
     repairs: tuple[str, ...] = field(repr=False)
     parts: int = field(repr=False)
+    intersecting: bool = field(repr=False)
     transparent: tuple[int, ...]
     solids: np.ndarray | None = field(repr=False)
     solid_labels: tuple[int, ...] = field(repr=False)
@@ -157,17 +163,18 @@ class MeshSurface:
         if period is not None:
             _check_extent(done.vertices, period)
         clear = transparent_solids(transparent, sided, period)
-        solids = None
-        if clear.labels:
-            solids = clear.number[np.isin(sided.mesh.source, done.source)]
+        kept = np.isin(sided.mesh.source, done.source)
+        solids = clear.number[kept] if clear.labels else None
+        cut = check_crossings(done, sided.body[kept], solids, period)
         table = done.faces.astype(np.int32)
         for array in (done.vertices, table, done.labels, solids):
             if array is not None:
                 array.setflags(write=False)
         for name, value in (
             ("vertices", done.vertices), ("faces", table), ("labels", done.labels),
-            ("period", period), ("kind", sided.kind), ("repairs", done.notes),
-            ("parts", len(sided.closed)), ("solids", solids),
+            ("period", period), ("kind", sided.kind),
+            ("repairs", (*done.notes, *cut.notes)), ("parts", len(sided.closed)),
+            ("solids", solids), ("intersecting", len(sided.closed) > 1 or cut.found),
             ("solid_labels", clear.labels), ("transparent", tuple(sorted({*clear.labels}))),
         ):  # fmt: skip
             object.__setattr__(self, name, value)
