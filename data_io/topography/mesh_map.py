@@ -75,7 +75,10 @@ def read_mesh_map(
         share = several.sum() / max(known.sum(), 1)
         if share > 0.5:
             problem = f"expected a surface, {share:.0%} of its nodes have several heights"
-            cure = "Cut the lower side of the body off, or trace it as a mesh."
+            cure = (
+                "Cut the lower side of the body off, or take it as a mesh: "
+                "pbrdf.MeshSurface, pbrdf statistics --kind mesh."
+            )
             raise DataFileError(path, problem, cure)
         msg = (
             f"{path.name}: the mesh hangs over at {several.sum()} of {known.sum()} nodes "

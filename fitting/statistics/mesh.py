@@ -1,7 +1,7 @@
 """Statistics of triangle meshes: slopes, overhangs and area, from the facets alone."""
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -69,12 +69,38 @@ class MeshStatistics:
         """Estimates as a table with one row each."""
         import pandas as pd
 
-        rows = {
+        return pd.DataFrame.from_dict(self._estimates(), orient="index")
+
+    def tilts(self) -> "pd.DataFrame":
+        """Return the share of the area by zenith angles of normals, one row a bin."""
+        import pandas as pd
+
+        edges = np.rad2deg(self.tilt).round(6)
+        return pd.DataFrame(
+            {
+                "tilt_low_deg": edges[:-1],
+                "tilt_high_deg": edges[1:],
+                "area_share": self.tilt_share,
+            }
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers, strings, lists and dicts, as for a report or a TOML file."""
+        numbers: dict[str, Any] = {
+            name: {**row, "units": "1"} for name, row in self._estimates().items()
+        }
+        return numbers | {
+            "tilt_deg": np.rad2deg(self.tilt).round(6).tolist(),
+            "tilt_share": self.tilt_share.tolist(),
+            "warnings": list(self.warnings),
+        }
+
+    def _estimates(self) -> dict[str, dict[str, float]]:
+        return {
             entry.name: getattr(self, entry.name).as_dict()
             for entry in fields(self)
             if isinstance(getattr(self, entry.name), Estimate)
         }
-        return pd.DataFrame.from_dict(rows, orient="index")
 
 
 def mesh_statistics(mesh: MeshSurface) -> MeshStatistics:

@@ -1,4 +1,4 @@
-"""The options of `pbrdf statistics` that belong to micrographs."""
+"""The options of `pbrdf statistics` that belong to micrographs, and those of meshes."""
 
 import json
 import zipfile
@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from skimage import io
 
 from examples.micrograph import Camera, gaussian_edge, photograph
 from pbrdf.cli import main
+from tests.meshes.shapes import plate
 
 CAMERA = Camera(um_per_pixel=0.5, dust=0.0)
 BAR = 80
@@ -93,3 +95,53 @@ def test_a_channel_belongs_to_a_map(tmp_path, capsys):
     profile.write_text("x_um,z_um\n" + "".join(f"{x},{np.sin(x):.5f}\n" for x in range(60)))
     assert main(["statistics", str(profile), "--channel", "Height"]) == 2
     assert "--channel does not belong to a profile" in capsys.readouterr().err
+
+
+def test_a_mesh_prints_what_a_map_cannot_hold(tmp_path, capsys):
+    """A ball over a plate: area and overhang from its radius; tilts add to one."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=1.5)
+    ball.apply_translation([5.0, 4.0, 2.0])
+    whole = trimesh.util.concatenate(trimesh.Trimesh(*plate(), process=False), ball)
+    whole.vertices *= 1e-3
+    path, told, tilts = (tmp_path / name for name in ("ball.ply", "told.json", "tilts.csv"))
+    whole.export(path)
+    options = ["--kind", "mesh", "--unit", "mm", "--period-um", "10,8", "--json", str(told)]
+    assert main(["statistics", str(path), *options, "--slopes", str(tilts)]) == 0
+    assert "overhang_share" in capsys.readouterr().out
+    found = json.loads(told.read_text())
+    area = 4 * np.pi * 1.5**2
+    assert found["area_ratio"]["value"] == pytest.approx(1 + area / 80, rel=0.01)
+    share = area / 2 / (80 + area)
+    assert found["overhang_share"]["value"] == pytest.approx(share, rel=0.06)
+    low, high, part = np.loadtxt(tilts, delimiter=",", skiprows=1).T
+    assert (high[-1], part.sum()) == (180.0, pytest.approx(1.0))
+    assert part[low >= 90.0].sum() == pytest.approx(share, rel=0.06)
+
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        '[surface]\ntype = "mesh"\nfile = "ball.ply"\nunit = "mm"\nperiod_um = [10, 8]\n'
+        "[substrate]\nn = 1.5\n"
+    )
+    assert main(["statistics", str(scene), "--json", str(tmp_path / "scene.json")]) == 0
+    assert json.loads((tmp_path / "scene.json").read_text()) == found
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (
+            ["--kind", "mesh", "--form", "none"],
+            "--form is not used for",
+        ),
+        (["--period-um", "10,8"], "--period-um is not used without --kind mesh"),
+        (["--kind", "mesh", "--period-um", "10"], "must be two lengths, as in 40,40"),
+        (["--unit", "um"], "pbrdf statistics --kind mesh"),
+    ],
+)
+def test_what_statistics_of_a_mesh_cannot_use_is_refused(
+    tmp_path, capsys, options, expected
+):
+    path = tmp_path / "ball.stl"
+    trimesh.creation.icosphere(subdivisions=2).export(path)
+    assert main(["--quiet", "statistics", str(path), *options]) == 2
+    assert expected in capsys.readouterr().err

@@ -2,12 +2,31 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pbrdf.cli import option_text, options
-from pbrdf.cli.options import Kind
+from pbrdf.cli.unused import refuse_unused
+
+if TYPE_CHECKING:
+    from pbrdf import MeshSurface
+
+# Options that have no meaning for a mesh
+_OF_HEIGHTS = (
+    "um_per_pixel", "spacing", "channel", "columns", "block", "um_per_level", "mend",
+    "form", "figure", "scale_bar_um", "edge", "material", "direction", "overlay", "cutoff",
+)  # fmt: skip
+
+
+class Kind(StrEnum):
+    """What a file holds of which statistics are asked for."""
+
+    auto = "auto"
+    profile = "profile"
+    map = "map"
+    image = "image"
+    mesh = "mesh"
 
 
 class Phase(StrEnum):
@@ -25,8 +44,22 @@ class Direction(StrEnum):
 
 
 def command(
-    surface: options.Surface,
-    kind: options.KindOption = Kind.auto,
+    context: typer.Context,
+    surface: Annotated[
+        Path,
+        typer.Argument(
+            help="Profile (x, z), height map, triangle mesh or scene with one, or "
+            "micrograph of an edge.",
+            show_default=False,
+        ),
+    ],
+    kind: Annotated[
+        Kind,
+        typer.Option(
+            help="What the file holds, if not as its name says; a mesh file is a map "
+            "without it."
+        ),
+    ] = Kind.auto,
     um_per_pixel: options.UmPerPixel = None,
     spacing: options.Spacing = None,
     unit: options.Unit = None,
@@ -65,7 +98,16 @@ def command(
     ] = None,
     slopes: Annotated[
         Path | None,
-        typer.Option(help="Write the slope distribution with its errors here (csv)."),
+        typer.Option(
+            help="Write the slope distribution with its errors here (csv); of a mesh the "
+            "share of its area by tilt."
+        ),
+    ] = None,
+    period: Annotated[
+        str | None,
+        typer.Option(
+            "--period-um", help="Periods of a --kind mesh along x and y: 40,40 [um]."
+        ),
     ] = None,
     cutoff: Annotated[
         float,
@@ -80,6 +122,8 @@ def command(
 ) -> None:
     """Print height, correlation length, slope and noise, each with its uncertainty.
 
+    With --kind mesh, overhangs included: area ratio, share of overhangs and walls, slopes.
+
     Examples: pbrdf statistics edge.png --um-per-pixel 0.5
 
     pbrdf statistics sem.jpg --scale-bar-um 120 --edge 3 --overlay check.png
@@ -87,6 +131,11 @@ def command(
     from pbrdf.cli.reading import read_surface
     from pbrdf.cli.staging import answer, staged_file
 
+    if kind is Kind.mesh or surface.suffix.lower() == ".toml":
+        refuse_unused(context, _OF_HEIGHTS, "for the statistics of a mesh")
+        _of_mesh(_mesh(context, surface, unit, period), slopes, as_json, force=force)
+        return
+    refuse_unused(context, ["period"], "without --kind mesh")
     picture = {
         "scale_bar_um": scale_bar_um,
         "edge": edge,
@@ -96,9 +145,9 @@ def command(
     if figure is not None:
         option_text.picture(figure, "--figure")
     heights = read_surface(
-        surface, kind=kind, um_per_pixel=um_per_pixel, spacing=spacing, unit=unit,
-        channel=channel, columns=columns, block=block, um_per_level=um_per_level,
-        mend=mend, picture=picture,
+        surface, kind=options.Kind(kind), um_per_pixel=um_per_pixel, spacing=spacing,
+        unit=unit, channel=channel, columns=columns, block=block,
+        um_per_level=um_per_level, mend=mend, picture=picture,
     )  # fmt: skip
     if overlay is not None:
         _draw_overlay(overlay, surface, heights, force=force)
@@ -117,6 +166,46 @@ def command(
 
         with staged_file(slopes, force=force) as stage:
             slope_distribution(heights, cutoff=cutoff).to_frame().to_csv(stage, index=False)
+
+
+def _mesh(
+    context: typer.Context, path: Path, unit: str | None, period: str | None
+) -> "MeshSurface":
+    """Read a mesh, from its own file or as the surface of a scene."""
+    from pbrdf import MeshSurface, load_scene
+
+    if path.suffix.lower() == ".toml":
+        refuse_unused(context, ["unit", "period"], "beside a scene file, which has its own")
+        surface = load_scene(path).surface
+        if not isinstance(surface, MeshSurface):
+            msg = (
+                f"{path.name} must be a scene with a mesh, got one with a "
+                f"{type(surface).__name__}. Name the file of its heights instead."
+            )
+            raise ValueError(msg)
+        return surface
+    lengths = None
+    if period is not None:
+        numbers = option_text.numbers(period, "--period-um")
+        if len(numbers) != 2:
+            msg = f"--period-um must be two lengths, as in 40,40, got {period!r}."
+            raise ValueError(msg)
+        lengths = numbers[0], numbers[1]
+    return MeshSurface(path, lengths, unit=unit)
+
+
+def _of_mesh(
+    mesh: "MeshSurface", slopes: Path | None, as_json: Path | None, *, force: bool
+) -> None:
+    """Print the statistics of a mesh."""
+    from fitting import surface_statistics
+    from pbrdf.cli.staging import answer, staged_file
+
+    found = surface_statistics(mesh)
+    answer(str(found), found.to_dict(), as_json, force=force)
+    if slopes is not None:
+        with staged_file(slopes, force=force) as stage:
+            found.tilts().to_csv(stage, index=False)
 
 
 def _draw_overlay(overlay: Path, surface: Path, heights: Any, *, force: bool) -> None:
