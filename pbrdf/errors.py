@@ -27,6 +27,18 @@ def shortened(text: str, most: int) -> str:
     return f"{text[: most - 5 - tail]} ... {text[-tail:]}"
 
 
+def percent(share: float) -> str:
+    """Return a share in per cent with two digits.
+
+    Examples
+    --------
+    >>> percent(0.9987), percent(0.0449)
+    ('100 %', '4.5 %')
+    """
+    value = 100.0 * share
+    return f"{value:.0f} %" if value >= 10.0 else f"{value:.2g} %"
+
+
 def told_once(notes: Iterable[str]) -> list[str]:
     """Return notes that differ in their numbers alone once, and how many more there were.
 
@@ -134,7 +146,8 @@ def real_array(name: str, values: npt.ArrayLike, cure: str = "") -> np.ndarray:
     try:
         array = np.asarray(plain, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        msg = f"{name} must be real numbers, got {values!r}. {cure}"
+        got = shortened(repr(values), 80)
+        msg = f"{name} must be real numbers, got {got}. {cure}"
         raise TypeError(msg.strip()) from error
     if hidden is not None and hidden.any():
         array = np.where(hidden, np.nan, array)

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from pbrdf.contaminants.arguments import positive
 from pbrdf.contaminants.ground import Ground
-from pbrdf.errors import require
+from pbrdf.errors import percent, require
 from pbrdf.surface.gaussian import GaussianSurface
 from pbrdf.surface.heightmap import HeightMap
 
@@ -156,7 +156,7 @@ def effective_contact_angle(
     steep = ground.steep_share(np.tan(contact_angle)) if contact_angle < np.pi / 2 else 0.0
     if steep > _STEEP_SHARE:
         notes.append(
-            f"{100 * steep:.2g} % of the surface is steeper than the contact angle of "
+            f"{percent(steep)} of the surface is steeper than the contact angle of "
             f"{degrees}: drops fill valleys and are no caps."
         )
     return contact_angle, notes

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pbrdf.errors import require
+from pbrdf.errors import percent, require
 from pbrdf.optics.materials import Material
 from pbrdf.validity.limits import Judgement
 
@@ -108,7 +108,7 @@ def _of_film(
         f"A film of {thickness:.3g} um is thinner than {least[w]:.2g} um, three coherence "
         f"lengths at {waves[w]:g} um and a bandwidth of {bandwidth:g} um: it interferes, "
         "which geometric optics does not know; its reflectance changes by up to "
-        f"{100 * fringe[w]:.2g} % at normal incidence."
+        f"{percent(fringe[w])} at normal incidence."
     ]
 
 

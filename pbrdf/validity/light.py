@@ -4,6 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from pbrdf.errors import percent
+
 # Share of the rays that rounding may lose: some in ten million
 MOST_LOST = 1e-6
 # Share of the light that may be missing without a word
@@ -80,5 +82,5 @@ wrong unit.
             if theta_i is not None:
                 place = f"at theta_i {np.rad2deg(theta_i[worst]):.4g} deg "
             cure = CURES[name].format(bounces=max_bounces)
-            notes.append(f"{100 * by_angle[worst]:.2g} % of the light {place}{cure}.")
+            notes.append(f"{percent(by_angle[worst])} of the light {place}{cure}.")
     return notes

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pbrdf.conventions import RESULT_VARIABLES
+from pbrdf.errors import percent
 from pbrdf.validity.roughness import FLAT, Roughness
 
 if TYPE_CHECKING:
@@ -127,9 +128,9 @@ def _of_beam(
     if taken.max() > MOST_COHERENT:
         a, w = np.unravel_index(np.argmax(taken), taken.shape)
         notes.append(
-            f"{100 * rough.flat:.2g} % of the surface is flat and is traced as a mirror, "
+            f"{percent(rough.flat)} of the surface is flat and is traced as a mirror, "
             "but its parts lie at different heights and interfere: "
-            f"{100 * share[a, w]:.2g} % of the light stays in the specular beam at "
+            f"{percent(share[a, w])} of the light stays in the specular beam at "
             f"{_place(theta[a], waves[w])}, the rest spreads by about "
             f"{np.rad2deg(spread[w]):.2g} deg"
             f"{_others(taken > MOST_COHERENT)}."
@@ -137,7 +138,7 @@ def _of_beam(
     if missed.max() > MOST_COHERENT:
         a, w = np.unravel_index(np.argmax(missed), missed.shape)
         notes.append(
-            f"{100 * missed[a, w]:.2g} % of the light stays in a coherent specular beam at "
+            f"{percent(missed[a, w])} of the light stays in a coherent specular beam at "
             f"{_place(theta[a], waves[w])} (rms height {rough.height_rms:.3g} um), which "
             "geometric optics spreads over the lobe"
             f"{_others(missed > MOST_COHERENT)}."
@@ -189,7 +190,7 @@ of three and more by up to 28 %. Take at least 5, a spacing of corr_length / 5 o
         least = rough.lengths * np.sqrt(size / LEAST_CHANGE)
         notes.append(
             f"A period of {rough.lengths:.3g} correlation lengths is too short: light of "
-            f"one bounce changes by up to {100 * size:.2g} %. Take shape times spacing of "
+            f"one bounce changes by up to {percent(size)}. Take shape times spacing of "
             f"{least:.2g} corr_length or more, better 16."
         )
     return notes

@@ -83,3 +83,20 @@ def test_bad_input_is_one_line(
     assert len(lines) == 1
     assert words in lines[0]
     assert sorted(folder.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("names", "options"), [(",wavelength_um", []), ("", ["--wavelength-um", "0.55"])]
+)
+def test_a_metal_takes_the_wavelength_of_the_scan_or_that_of_the_option(
+    folder: Path, names: str, options: list[str]
+) -> None:
+    metal = SCENE.split("[substrate]")[0] + '[substrate]\nmaterial = "aluminium"\n'
+    (folder / "metal.toml").write_text(metal)
+    value = ",0.55" if names else ""
+    (folder / "one.csv").write_text(
+        f"theta_i_deg,theta_s_deg,dphi_deg{names},M00\n30,30,180{value},0.5\n"
+    )
+    command = ["observe", "metal.toml", "--scan", "one.csv", "-o", "one.nc", *options]
+    assert main(["-q", *command, *QUICK]) == 0
+    assert read_result(folder / "one.nc").wavelength.item() == pytest.approx(0.55)

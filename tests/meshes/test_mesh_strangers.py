@@ -243,3 +243,17 @@ def test_overhangs_lit_from_aside_send_out_all_16_elements_by_bounces(shape):
     apart = np.abs(found - light.mean(axis=0))[:2]
     assert (apart < 4.0 * error[:2] + 1e-5).all()
     assert (np.abs(light.mean(axis=0))[0] > 8.0 * error[0]).sum() >= 8
+
+
+def test_a_size_that_no_surface_has_raises_doubt_about_the_unit(tmp_path):
+    path = tmp_path / "ball.stl"
+    trimesh.creation.icosphere(subdivisions=1, radius=0.02).export(path)
+    with pytest.warns(AccuracyWarning, match=r"0\.04 um long, less than a wave.*--unit"):
+        MeshSurface(path)
+    assert MeshSurface(path, unit="mm").repairs == ()
+    assert MeshSurface(path, unit="um").size[0] == pytest.approx(0.04, rel=1e-6)
+    big = trimesh.creation.box((2e6, 1e6, 1.0))
+    with pytest.warns(AccuracyWarning, match="more than a metre"):
+        MeshSurface(big)
+    big.units = "nanometers"
+    assert MeshSurface(big).size[0] == pytest.approx(2e3)

@@ -301,3 +301,9 @@ def test_a_scene_file_names_a_mesh_file(tmp_path):
 def test_a_map_with_holes_makes_no_mesh():
     with pytest.raises(ValueError, match="complete"):
         MeshSurface.of_map(HeightMap([[0.0, 1.0], [np.nan, 2.0]], 1.0))
+
+
+def test_labels_in_words_are_refused_in_a_line():
+    with pytest.raises(TypeError, match="labels must be real numbers") as refused:
+        MeshSurface(plate(cells=9), (10.0, 8.0), labels=["glass"] * 162)
+    assert len(str(refused.value)) < 200

@@ -125,7 +125,7 @@ def command(
         _only_with_scan(declared)
         geometry = _plane(theta_i, theta_view)
     else:
-        geometry = _of_scan(scan, None if waves is None else waves[0], declared)
+        geometry, waves = _of_scan(scan, waves, declared)
     azimuth = _one_azimuth(phi_i)
     store = target_file.suffix == ".zarr"
     staged = staged_store if store else staged_file
@@ -194,18 +194,27 @@ def _only_with_scan(declared: "Mapping[str, object]") -> None:
 
 
 def _of_scan(
-    path: Path, wavelength: float | None, declared: "Mapping[str, Any]"
-) -> "tuple[np.ndarray, np.ndarray, np.ndarray]":
-    """Return the geometries of a measured scan, each once. [rad]"""
+    path: Path, waves: list[float] | None, declared: "Mapping[str, Any]"
+) -> "tuple[tuple[np.ndarray, np.ndarray, np.ndarray], list[float] | None]":
+    """Return the geometries of a measured scan, each once, and the wavelengths to trace.
+
+    A scan that names none holds geometries of any; of one that names one, it is taken where
+    none was asked for. [rad], [um]
+    """
     import numpy as np
 
     from pbrdf.cli.reading import read_scan
 
-    scan = read_scan(path, wavelength=wavelength, declared=declared)
+    scan = read_scan(path, declared=declared)
+    if "wavelength" in scan.coords:
+        if waves is not None:
+            scan = read_scan(path, wavelength=waves[0], declared=declared)
+        elif scan.wavelength.size == 1 or np.ptp(scan.wavelength.values) == 0.0:
+            waves = [float(scan.wavelength.values.flat[0])]
     rows = np.stack([scan[name].values for name in ("theta_i", "theta_s", "dphi")], axis=1)
     _, first = np.unique(rows.round(9), axis=0, return_index=True)
     columns = rows[np.sort(first)].T
-    return columns[0], columns[1], columns[2]
+    return (columns[0], columns[1], columns[2]), waves
 
 
 def _brightest(result: "xr.Dataset") -> "Iterator[str]":

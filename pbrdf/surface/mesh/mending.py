@@ -15,6 +15,8 @@ FLAT = 1e-9
 NAMED = 3
 # Steps of float32 above this share of the median edge turn facets; edges looked at
 COARSE, MOST_SAMPLED = 1e-3, 100_000
+# Extents of meshes that are probably meant [um]
+LIKELY = 0.4, 1e6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,6 +172,19 @@ def rounding_note(vertices: np.ndarray, faces: np.ndarray) -> tuple[str, ...]:
         f"Vertices lie up to {np.abs(vertices).max():.3g} from the origin, where the "
         f"float32 numbers of a file are {step:.2g} apart: {100 * step / middle:.2g} % of "
         "the median edge. Move the mesh to its origin before it is written.",
+    )
+
+
+def size_note(vertices: np.ndarray, *, known: bool) -> tuple[str, ...]:
+    """Doubt micrometres that nobody named, of a mesh of an unlikely size."""
+    extent = float(np.ptp(vertices, axis=0).max())
+    least, most = LIKELY
+    if known or least <= extent <= most:
+        return ()
+    size = "less than a wavelength of light" if extent < least else "more than a metre"
+    return (
+        f"The mesh is {extent:.3g} um long, {size}: no unit is named, and its numbers are "
+        "taken as micrometres. Give unit= in Python, unit in a scene file, or --unit.",
     )
 
 

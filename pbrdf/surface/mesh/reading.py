@@ -84,7 +84,7 @@ def _own(path: Path) -> Raw:
         faces = arrays["faces"]
         labels = arrays.get("labels")
         parts = np.zeros(len(faces), int) if labels is None else labels
-        return Raw(arrays["vertices"], faces, parts, None, labels)
+        return Raw(arrays["vertices"], faces, parts, "um", labels)
 
 
 def _raw_of(loaded: Any, *, backwards: bool = False) -> Raw | None:

@@ -11,22 +11,26 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pbrdf.errors import AccuracyWarning, DataFileError, require
+from pbrdf.errors import AccuracyWarning, DataFileError
 from pbrdf.surface.heightmap import HeightMap
+from pbrdf.surface.mesh.arguments import (
+    check_extent,
+    checked_labels,
+    checked_period,
+    is_parts,
+)
 from pbrdf.surface.mesh.crossings import check_crossings
 from pbrdf.surface.mesh.mending import (
     checked_arrays,
     mend,
     rounding_note,
+    size_note,
     without_flat_faces,
 )
 from pbrdf.surface.mesh.reading import Raw, micrometres, raw_mesh
 from pbrdf.surface.mesh.sides import with_sides
 from pbrdf.surface.mesh.solids import transparent_solids
 from pbrdf.surface.mesh.topology import face_vectors
-
-# Labels of faces by the part of a file that they come from
-PARTS = "parts"
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -121,11 +125,12 @@ class MeshSurface:
         transparent: bool | Sequence[int] = False,
     ) -> None:
         raw = raw_mesh(mesh)
-        lengths = None if period is None else _checked_period(period)
+        lengths = None if period is None else checked_period(period)
         try:
             doubts = self._build(
-                raw, lengths, labels, micrometres(unit, raw.unit), transparent
-            )
+                raw, lengths, labels, micrometres(unit, raw.unit), transparent,
+                unit_known=unit is not None or raw.unit is not None,
+            )  # fmt: skip
         except DataFileError:
             raise
         except (TypeError, ValueError) as error:
@@ -145,9 +150,11 @@ class MeshSurface:
         labels: npt.ArrayLike | str | None,
         unit: float,
         transparent: bool | Sequence[int],
+        *,
+        unit_known: bool,
     ) -> tuple[str, ...]:
         vertices, faces = checked_arrays(raw.vertices, raw.faces)
-        if _is_parts(labels):
+        if is_parts(labels):
             labels = raw.parts
             if labels is None:
                 msg = (
@@ -157,11 +164,11 @@ class MeshSurface:
                 raise ValueError(msg)
         elif labels is None:
             labels = raw.labels
-        numbers = _checked_labels(labels, len(faces))
+        numbers = checked_labels(labels, len(faces))
         sided = with_sides(mend(vertices * unit, faces, numbers), period)
         done = without_flat_faces(sided.mesh)
         if period is not None:
-            _check_extent(done.vertices, period)
+            check_extent(done.vertices, period)
         clear = transparent_solids(transparent, sided, period)
         kept = np.isin(sided.mesh.source, done.source)
         solids = clear.number[kept] if clear.labels else None
@@ -178,7 +185,7 @@ class MeshSurface:
             ("solid_labels", clear.labels), ("transparent", tuple(sorted({*clear.labels}))),
         ):  # fmt: skip
             object.__setattr__(self, name, value)
-        return rounding_note(vertices, faces)
+        return rounding_note(vertices, faces) + size_note(done.vertices, known=unit_known)
 
     def __repr__(self) -> str:
         lies = "alone" if self.period is None else f"period={self.period} um"
@@ -263,54 +270,3 @@ class MeshSurface:
         return trimesh.Trimesh(
             np.array(self.vertices), np.array(self.faces), process=False, units="um"
         )
-
-
-def _is_parts(labels: npt.ArrayLike | str | None) -> bool:
-    if isinstance(labels, str) and labels != PARTS:
-        msg = f'labels must be numbers of materials or "{PARTS}", got {labels!r}.'
-        raise ValueError(msg)
-    return isinstance(labels, str)
-
-
-def _checked_labels(labels: Any, faces: int) -> np.ndarray | None:
-    """One number of a material for each face."""
-    if labels is None:
-        return None
-    numbers = require(
-        "labels", labels, lambda v: (v >= 0) & (v <= 255) & (v == np.floor(v)),
-        "be whole numbers in [0, 255]", "Number the materials from 0.",
-    )  # fmt: skip
-    if numbers.shape != (faces,):
-        msg = (
-            f"labels must have one number for each of the {faces} faces, got shape "
-            f"{numbers.shape}. Number the materials of faces from 0."
-        )
-        raise ValueError(msg)
-    return numbers.astype(np.uint8)
-
-
-def _checked_period(period: tuple[float, float]) -> tuple[float, float]:
-    lengths = require(
-        "period", period, lambda v: (v > 0) & np.isfinite(v), "be positive [um]",
-        "Give (lx, ly), or None for a mesh that does not repeat.",
-    )  # fmt: skip
-    if lengths.shape != (2,):
-        msg = f"period must be (lx, ly) [um], got shape {lengths.shape}."
-        raise ValueError(msg)
-    return float(lengths[0]), float(lengths[1])
-
-
-def _check_extent(vertices: np.ndarray, period: tuple[float, float]) -> None:
-    """Refuse a mesh that overlaps so many of its images that the period must be wrong."""
-    widths = np.ptp(vertices[:, :2], axis=0)
-    laps = float((widths / period).max())
-    if laps > MOST_LAPS:
-        msg = (
-            f"period must be no less than an {MOST_LAPS}th of the mesh [um], got {period} "
-            f"for a mesh of {widths[0]:.4g} x {widths[1]:.4g} um. Check the unit."
-        )
-        raise ValueError(msg)
-
-
-# A mesh may reach over so many of its periods
-MOST_LAPS = 8
