@@ -28,7 +28,7 @@ from pbrdf.files import complete_file
 from pbrdf.files.hdf5 import FAULTS, first_line, opened
 
 # Pieces of a variable; smaller ones take longer to read [bytes]
-_CHUNK = 2**20
+_CHUNK = 2**19
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
@@ -151,8 +151,14 @@ def _plain_again(path: str | Path, dataset: xr.Dataset) -> xr.Dataset:
         raise DataFileError(path, problem, "The file is damaged.") from error
     dataset.encoding = {}
     for name in ("brdf_total", "brdf"):
-        if name in dataset and np.isinf(dataset[name].to_numpy()).any():
-            problem, place = "it holds inf, which no run gives", f"variable {name}"
+        if name not in dataset:
+            continue
+        place = f"variable {name}"
+        if dataset[name].dtype.kind not in "fiu":
+            problem = f"expected numbers, got {dataset[name].dtype}"[:150]
+            raise DataFileError(path, problem, "Repeat the run.", column=place)
+        if np.isinf(dataset[name].to_numpy()).any():
+            problem = "it holds inf, which no run gives"
             raise DataFileError(path, problem, "Repeat the run.", column=place)
     return dataset
 

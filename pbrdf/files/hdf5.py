@@ -1,10 +1,13 @@
 """What an HDF5 file may hold before it is believed: no links outwards, bombs or holes."""
 
+import math
+import struct
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from operator import lt
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
@@ -24,14 +27,23 @@ FAULTS = (
     AttributeError,
     AssertionError,
     MemoryError,
-    OverflowError,
+    ArithmeticError,
     RecursionError,
     EOFError,
     SystemError,
+    struct.error,
 )
 # A result may be so much larger than its file; noise compresses by less than two
 MOST_EXPANSION = 2000
 MOST_BYTES = 16 * 2**30
+MOST_ENTRIES = 1000
+# Bytes of a packed piece, of which zlib makes at most a thousand times as many
+_MOST_PACKED = 2**19
+_FILTERS = {
+    h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32,
+    h5py.h5z.FILTER_SZIP, h5py.h5z.FILTER_NBIT, h5py.h5z.FILTER_SCALEOFFSET,
+    h5py.h5z.FILTER_LZF,
+}  # fmt: skip
 # Name and version of a global heap
 _HEAP = b"GCOL\1\0\0\0"
 _WORD = np.frombuffer(_HEAP, "<u4")[0]
@@ -130,8 +142,16 @@ def _heaps(stream: BinaryIO, size: int) -> Iterator[int]:
                 place = block.find(_HEAP, place + 4)
 
 
-def _check_group(path: str | Path, group: h5py.Group, size: int, depth: int = 0) -> None:
+def _check_group(
+    path: str | Path, group: h5py.Group, size: int, depth: int = 0, count: int = 0
+) -> int:
+    """Check what a group holds; return how many entries have been met so far."""
     for name in group:
+        count += 1
+        # Groups may hold others by many ways
+        if count > MOST_ENTRIES:
+            problem = f"it holds more than {MOST_ENTRIES} groups and variables"
+            raise DataFileError(path, problem, HOSTILE)
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
             problem = f"{name[:80]} is a link to somewhere else"
             raise DataFileError(path, problem, HOSTILE)
@@ -140,9 +160,10 @@ def _check_group(path: str | Path, group: h5py.Group, size: int, depth: int = 0)
             # A group can hold itself
             if depth > 8:
                 raise DataFileError(path, "its groups nest too deeply", HOSTILE)
-            _check_group(path, item, size, depth + 1)
+            count = _check_group(path, item, size, depth + 1, count)
         elif isinstance(item, h5py.Dataset):
             _check_dataset(path, name, item, size)
+    return count
 
 
 def _check_dataset(path: str | Path, name: str, item: h5py.Dataset, size: int) -> None:
@@ -162,10 +183,36 @@ def _check_dataset(path: str | Path, name: str, item: h5py.Dataset, size: int) -
     for side, chunk in zip(item.shape, item.chunks, strict=True):
         expected *= -(-side // chunk)
     # A damaged index puts pieces outside, and what they should fill is read as missing
-    places = set()
-    # Its answer would end the search unless it is None
-    item.id.chunk_iter(lambda chunk: places.add(chunk.chunk_offset))
+    places = {}
+
+    def note(chunk: Any) -> None:
+        # An answer would end the search unless it is None
+        places[chunk.chunk_offset] = chunk.size
+
+    item.id.chunk_iter(note)
     inside = sum(all(map(lt, offset, item.shape)) for offset in places)
     if inside != expected:
         problem = f"it holds {inside} of {expected} pieces of its data"
         raise DataFileError(path, problem, DAMAGED, column=place)
+    _check_packing(path, place, item, places)
+
+
+def _check_packing(
+    path: str | Path, place: str, item: h5py.Dataset, sizes: dict[tuple[int, ...], int]
+) -> None:
+    """Refuse pieces that would grow beyond their size: HDF5 inflates to the end."""
+    made = item.id.get_create_plist()
+    filters = [made.get_filter(k)[0] for k in range(made.get_nfilters())]
+    if len(set(filters)) < len(filters) or not _FILTERS.issuperset(filters):
+        raise DataFileError(path, "it is packed in a foreign way", HOSTILE, column=place)
+    if h5py.h5z.FILTER_DEFLATE not in filters:
+        return
+    expected = math.prod(item.chunks) * item.dtype.itemsize
+    for offset, size in sizes.items():
+        # Zlib packs at most so well; smaller pieces cannot fill the memory
+        if size > _MOST_PACKED:
+            unpack = zlib.decompressobj()
+            unpack.decompress(item.id.read_direct_chunk(offset)[1], expected + 1024)
+            if unpack.unconsumed_tail:
+                problem = f"a piece of it grows beyond {expected} bytes"
+                raise DataFileError(path, problem, HOSTILE, column=place)

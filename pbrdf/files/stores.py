@@ -1,6 +1,7 @@
 """Zarr stores, folders of chunks, checked before anything in them is believed."""
 
 import json
+import math
 import stat
 from collections.abc import Iterator
 from itertools import chain
@@ -16,6 +17,11 @@ __all__ = ["check_store", "description"]
 # What this program writes; others might run anything, or fetch data from elsewhere
 _CODECS = {"bytes", "zstd", "vlen-utf8", "crc32c"}
 _MOST_FILES, _MOST_METADATA = 200_000, 16 * 2**20
+# Of a variable of a result
+_MOST_PIECES = 20_000
+# Bytes of a piece of texts, whose number says nothing of their length
+_MOST_TEXT = 64 * 2**20
+_ZSTD = b"\x28\xb5\x2f\xfd"
 # A variable may be so much larger than the store
 _MOST_EXPANSION = 2000
 # Points of a sweep, whose states are read at once
@@ -39,25 +45,14 @@ def check_store(path: Path, *, sparse: bool = False) -> None:
     DataFileError
         Naming the variable.
     """
-    size = 0
-    for number, entry in enumerate(chain([path], path.rglob("*"))):
-        try:
-            mode = entry.lstat()
-        except FileNotFoundError:
-            # A sweep that is running has moved it to its place
-            continue
-        if number > _MOST_FILES or (number and stat.S_ISLNK(mode.st_mode)):
-            problem = f"{entry.name[:80]} is a link, or one of too many files"
-            raise DataFileError(path, problem, _HOSTILE)
-        if not (stat.S_ISREG(mode.st_mode) or stat.S_ISDIR(mode.st_mode) or not number):
-            raise DataFileError(path, f"{entry.name[:80]} is no regular file", _HOSTILE)
-        size += mode.st_size
+    size = _size(path)
     for name, about in _variables(path):
         place = f"variable {name[:80]}"
         try:
             codecs = {str(one["name"]) for one in about["codecs"]}
             count = float(np.prod([float(side) for side in about["shape"]]))
-        except (KeyError, TypeError, ValueError) as error:
+            pieces = [float(side) for side in _pieces(about)]
+        except (LookupError, TypeError, ValueError, OverflowError) as error:
             problem = "its shape or its codecs are missing, or no such"
             raise DataFileError(path, problem, _DAMAGED, column=place) from error
         if codecs - _CODECS or about.get("storage_transformers"):
@@ -70,6 +65,66 @@ def check_store(path: Path, *, sparse: bool = False) -> None:
                 f"it would take {8 * count / 2**20:.0f} MiB of a store of {size} bytes"
             )
             raise DataFileError(path, problem, _DAMAGED, column=place)
+        if not sparse:
+            _check_pieces(path, name, count, float(np.prod(pieces)))
+
+
+def _size(path: Path) -> int:
+    """Return the size of all files of a store; refuse links, devices and endless depth."""
+    size = 0
+    try:
+        for number, entry in enumerate(chain([path], path.rglob("*"))):
+            try:
+                mode = entry.lstat()
+            except FileNotFoundError:
+                # A sweep that is running has moved it to its place
+                continue
+            if number > _MOST_FILES or (number and stat.S_ISLNK(mode.st_mode)):
+                problem = f"{entry.name[:80]} is a link, or one of too many files"
+                raise DataFileError(path, problem, _HOSTILE)
+            regular = stat.S_ISREG(mode.st_mode) or stat.S_ISDIR(mode.st_mode)
+            if number and not regular:
+                problem = f"{entry.name[:80]} is no regular file"
+                raise DataFileError(path, problem, _HOSTILE)
+            size += mode.st_size
+    except (RecursionError, OSError) as error:
+        raise DataFileError(path, "its folders nest too deeply", _HOSTILE) from error
+    return size
+
+
+def _pieces(about: dict[str, Any]) -> list[Any]:
+    """Return the sides of the pieces that a variable is stored in."""
+    return list(about["chunk_grid"]["configuration"]["chunk_shape"])
+
+
+def _check_pieces(path: Path, name: str, count: float, piece: float) -> None:
+    """Refuse pieces that are too many, or would grow beyond their size."""
+    place = f"variable {name[:80]}"
+    if not piece > 0 or count > _MOST_PIECES * piece:
+        problem = f"its {count:g} values are in pieces of {piece:g}"
+        raise DataFileError(path, problem, _DAMAGED, column=place)
+    for file in (path / name / "c").rglob("*"):
+        if not file.is_file():
+            continue
+        with file.open("rb") as stream:
+            grown = _grown(stream.read(18))
+        if grown is not None and grown > 16 * piece + _MOST_TEXT:
+            problem = f"a piece of it would take {grown / 2**20:.0f} MiB"
+            raise DataFileError(path, problem, _HOSTILE, column=place)
+
+
+def _grown(head: bytes) -> float:
+    """Return the size that a frame of Zstandard says it grows to; inf if it says none.
+
+    RFC 8878, 3.1.1.1: magic number, descriptor, window, dictionary, size of the content.
+    """
+    if head[:4] != _ZSTD or len(head) < 6:
+        return 0.0
+    descriptor = head[4]
+    single = descriptor >> 5 & 1
+    width = (single, 2, 4, 8)[descriptor >> 6]
+    start = 6 - single + (0, 1, 2, 4)[descriptor & 3]
+    return int.from_bytes(head[start : start + width], "little") if width else math.inf
 
 
 def _variables(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
