@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 import pbrdf
-from data_io import read_goniometer, read_height_map, read_result, write_result
+from data_io import (
+    read_goniometer,
+    read_height_map,
+    read_profile,
+    read_result,
+    write_result,
+)
 from data_io.topography.column_names import _split_outside
 from pbrdf.errors import DataFileError
 from pbrdf.signatures.bands import read_response
@@ -87,6 +93,15 @@ def test_readings_brighter_than_any_surface_are_refused(tmp_path):
     with pytest.raises(DataFileError, match=r"line 2, column M00: expected at most 1e\+09"):
         read_goniometer(path)
     assert read_goniometer(path, quantity="relative").M00[0] == 1e12
+
+
+@pytest.mark.parametrize("scale", ["0", "-1.0", "nan", "1e999"])
+def test_scales_of_a_profile_are_numbers_above_zero(tmp_path, scale):
+    path = tmp_path / "a.prf"
+    heights = "".join(f"{k % 7}\n" for k in range(40))
+    path.write_text(f"1 2\nCX I 40 MM 1e-3 D\nCZ A 40 UM {scale} D\nEOR\n{heights}EOR\n")
+    with pytest.raises(DataFileError, match="column CZ: expected a scale above 0, got"):
+        read_profile(path)
 
 
 def test_results_that_no_run_gives_are_refused(tmp_path):

@@ -4,6 +4,7 @@ Two lines describe the axes: ``CX I 400 MM 1.0e-3 D`` gives the kind of axis (I 
 incremental, A listed), the number of points, the unit, the scale and the type of number.
 """
 
+import math
 import re
 from pathlib import Path
 
@@ -47,6 +48,11 @@ def read_measurement_standard(path: Path) -> tuple[np.ndarray, np.ndarray]:
     except (ValueError, IndexError) as error:
         problem = f"expected axes CX and CZ with unit and scale, and numbers, got: {error}"
         raise DataFileError(path, problem, "Export the profile as columns x, z.") from error
+    for axis, size in sizes.items():
+        if not 0.0 < size < math.inf:
+            problem = f"expected a scale above 0, got {size:g} um"
+            cure = "Mend it, or export the profile as columns x, z."
+            raise DataFileError(path, problem, cure, column=f"C{axis}")
     if table.shape[0] != counts["Z"]:
         problem = f"expected {counts['Z']:g} heights as CZ says, got {table.shape[0]}"
         cure = "The file is truncated; or mend the number, or export columns x, z."

@@ -1,13 +1,15 @@
 """Vertices and faces out of what a user has: a file, or what trimesh made."""
 
+import logging
 from pathlib import Path
 from typing import Any, NamedTuple
+from urllib.parse import unquote
 
 import numpy as np
 
 from pbrdf.errors import DataFileError, real_array
-from pbrdf.files import file_size
-from pbrdf.surface.mesh.promises import check_promises
+from pbrdf.files import companion, file_size, read_bounded
+from pbrdf.surface.mesh.promises import buffers_of, check_promises
 
 FORMATS = (".stl", ".ply", ".obj", ".glb", ".gltf", ".off")
 # Arrays `vertices`, `faces` and perhaps `labels`, in float64
@@ -57,13 +59,10 @@ def read_mesh_file(path: Path) -> Raw:
     try:
         if suffix == OWN_FORMAT:
             return _own(path)
-        import trimesh
-
-        obj = suffix == ".obj"
-        more: dict[str, Any] = {"split_objects": True} if obj else {}
-        loaded = trimesh.load(path, process=False, **more)
         # Of OBJ trimesh takes the parts from the last one on
-        raw = _raw_of(loaded, backwards=obj)
+        raw = _raw_of(_loaded(path), backwards=suffix == ".obj")
+    except DataFileError:
+        raise
     except Exception as error:
         # Its readers fail in every way that a damaged file can make an array fail
         reason = f"{type(error).__name__}: {error}"[:200]
@@ -76,6 +75,32 @@ def read_mesh_file(path: Path) -> Raw:
         )
     # Numbers of a file are micrometres unless the caller says otherwise
     return raw._replace(unit=None)
+
+
+def _loaded(path: Path) -> Any:
+    """Load a mesh by trimesh, which gets no other files but the buffers of glTF."""
+    import trimesh
+
+    buffers = buffers_of(path)
+
+    class Buffers(trimesh.resolvers.FilePathResolver):
+        def get(self, name: str) -> bytes:
+            if name not in buffers:
+                return b""
+            return read_bounded(companion(path, unquote(name), "buffers"))
+
+    more: dict[str, Any] = {"split_objects": True} if path.suffix.lower() == ".obj" else {}
+    # It tells of colours and pictures that are not there
+    told = trimesh.util.log
+    told.addFilter(_mute)
+    try:
+        return trimesh.load(path, process=False, resolver=Buffers(str(path)), **more)
+    finally:
+        told.removeFilter(_mute)
+
+
+def _mute(_: logging.LogRecord) -> bool:
+    return False
 
 
 def _own(path: Path) -> Raw:
@@ -93,8 +118,9 @@ def _raw_of(loaded: Any, *, backwards: bool = False) -> Raw | None:
         pieces = []
         # The nodes of a graph come in an order of their own, not that of the file
         names = list(loaded.geometry)[:: -1 if backwards else 1]
+        place = {name: k for k, name in enumerate(names)}
         nodes = sorted(
-            loaded.graph.nodes_geometry, key=lambda node: names.index(loaded.graph[node][1])
+            loaded.graph.nodes_geometry, key=lambda node: place[loaded.graph[node][1]]
         )
         for node in nodes:
             transform, name = loaded.graph[node]
