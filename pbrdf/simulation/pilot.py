@@ -1,6 +1,7 @@
 """Rays and realisations for a target error, from a short pilot run."""
 
 import warnings
+from ast import literal_eval
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,9 +17,10 @@ FEW_RAYS, MORE_RAYS = 1000, 8000
 PILOT_SAMPLES = 16
 # Tells the streams of the pilot from those of the run
 PILOT = 1
-# Times of a node of a new surface and of a ray with its looks, in any unit: their ratio on
-# the machines tried. A plan by the clock would not be reproducible
-NODE_TIME, RAY_TIME = 0.15, 1.0
+# Times of a node of a new surface, of a body that is laid on it, and of a ray with its
+# looks, or among bodies with what it splits into, in any unit: their ratio on the machines
+# tried. A plan by the clock would not be reproducible
+NODE_TIME, BODY_TIME, RAY_TIME, WET_RAY_TIME = 0.15, 12_000.0, 1.0, 4.0
 LEAST_RAYS, MOST_RAYS = 1000, 1_000_000
 # Batches of rays over a fixed surface, and realisations, at least
 LEAST_SAMPLES = 16
@@ -91,7 +93,8 @@ def choose(
                 f"them, for {100 * target:.3g} %."
             ],
         )  # fmt: skip
-    best = np.sqrt(of_rays * _nodes(scene) * NODE_TIME / (of_surfaces * RAY_TIME))
+    sample_time, ray_time = _times(scene, pilot)
+    best = np.sqrt(of_rays * sample_time / (of_surfaces * ray_time))
     n_rays = int(np.clip(best, LEAST_RAYS, MOST_RAYS))
     square = (of_surfaces + of_rays / n_rays) * worst / more * samples
     expected = max(int(np.ceil(square / target**2)), LEAST_SAMPLES)
@@ -104,8 +107,13 @@ def choose(
     )  # fmt: skip
 
 
-def _nodes(scene: Scene) -> int:
-    return int(np.prod(getattr(scene.surface, "shape", (1, 1))))
+def _times(scene: Scene, pilot: xr.Dataset) -> tuple[float, float]:
+    """Return the times of a realisation and of a ray, by the bodies of the pilot."""
+    nodes = int(np.prod(getattr(scene.surface, "shape", (1, 1))))
+    reports = [literal_eval(one) for one in pilot.attrs["contaminants"]]
+    bodies = sum(one.get("number", 0) for one in reports)
+    ray_time = WET_RAY_TIME if scene.contaminants else RAY_TIME
+    return nodes * NODE_TIME + bodies * BODY_TIME, ray_time
 
 
 def _squares(pilot: xr.Dataset) -> tuple[float, float]:

@@ -28,6 +28,9 @@ from pbrdf.kernels.terrain.heightfield import (
 )
 
 SOLVER_STEPS = 80
+# An excess of the smaller volume that one step of Newton's rule brings down to rounding: it
+# falls with its square
+LAST_STEP = 5e-6
 # How often to look for the lowest point near a body in an ever smaller circle
 FLOORS = 3
 CIRCLE = 16
@@ -228,10 +231,10 @@ def settled_height(
             heights, periodic, pitch_x, pitch_y, z_min, slabs, x, y, z, azimuths
         )
         excess = above - volume if above < sunk else (whole - volume) - sunk
-        enough = abs(excess) <= 1e-13 * above
-        if (enough and above < sunk) or high - low <= 1e-15 * (abs(low) + abs(high)):
-            break
-        if enough and abs(excess) <= 1e-15 * whole:
+        if abs(excess) <= LAST_STEP * min(above, sunk) and wetted > 0.0:
+            return z + excess / wetted, volume + excess, wetted, rim
+        enough = abs(excess) <= 1e-15 * whole
+        if enough or high - low <= 1e-15 * (abs(low) + abs(high)):
             break
         if excess > 0.0:
             low = z
