@@ -67,7 +67,8 @@ class BeamLook:
             _trace(target, _source(target, look, theta, rng), look, tally)
             _add(sample, group, cones, tally)
         return Sight(
-            brdf=sample.brdf, caught=sample.caught, glints=sample.glints,
+            brdf=sample.brdf, caught=sample.caught, tried=sample.tried,
+            glints=sample.glints,
             glints_caught=sample.glints_caught, foretold=sample.foretold, one=sample.one,
             energy=sample.energy / sample.bundles, counts=sample.counts,
             facet_counts=sample.facet_counts, bundles=sample.bundles, notes=target.notes,

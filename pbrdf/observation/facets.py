@@ -10,6 +10,7 @@ from pbrdf.kernels.cones import facets as observe_facets
 from pbrdf.kernels.cones.matrix import Cones, mean_mueller
 from pbrdf.kernels.cones.mesh_facets import show_mesh_facets
 from pbrdf.kernels.optics.vectors import Vec
+from pbrdf.observation.expected import Expected
 from pbrdf.observation.look import Look, Sums, forward
 from pbrdf.tracer.field import GUARD_HEIGHTS, GUARD_SHARE, Field
 from pbrdf.tracer.mesh_field import MeshField
@@ -31,15 +32,24 @@ DISC_RULE = np.array(
 )
 
 
-def ask_facets(surface: Field | MeshField, sample: Sums, rng: np.random.Generator) -> None:
-    """Add the single mirror reflections of every geometry to the sample."""
+def ask_facets(
+    surface: Field | MeshField,
+    sample: Sums,
+    rng: np.random.Generator,
+    expected: Expected | None,
+) -> None:
+    """Add the single mirror reflections of every geometry to the sample.
+
+    Where it is known what facets show on average, what these show too much if none hides
+    another is taken off, by the share that is in sight.
+    """
     look = sample.look
     if isinstance(surface, MeshField):
         facets, largest, show = _mesh_facets(surface)
     else:
         facets, largest, show = _map_facets(surface)
     paths = look.estimator == "paths"
-    means = np.empty(0) if paths else mean_matrices(look)
+    means = np.empty(0) if paths and expected is None else mean_matrices(look)
     room = np.empty((4, 4))
     omega_i, omega_s = look.solid_angles()
     for g in range(look.size):
@@ -59,6 +69,11 @@ def ask_facets(surface: Field | MeshField, sample: Sums, rng: np.random.Generato
             tried = counts[observe_facets.N_POINTS]
             known = max(1.0 - counts[observe_facets.N_ASIDE] / tried, 1.0 / tried)
         scale = 1.0 / (len(azimuths) * omega_i[g] * omega_s[g] * known)
+        if expected is not None:
+            tried = scale * float(shown[:, observe_facets.TRIED_FLUX].sum())
+            amiss = expected.seen[g] * (tried - expected.light[g])
+            sample.brdf[g, 0] -= amiss * means[g][:, 0]
+        sample.tried[g] += counts[observe_facets.N_POINTS]
         if paths:
             sample.brdf[g, 0] += scale * forward(matrices)
             strength = 1.0

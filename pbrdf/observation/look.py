@@ -104,8 +104,10 @@ class Sight:
         Forward matrices, from source to detector. [1/sr]
     caught : ndarray of int, shape (geometries, bounces)
         Paths or facets that joined source and detector.
+    tried : ndarray of int, shape (geometries,)
+        Points tried on facets that may join source and detector.
     glints, glints_caught
-        The part of both that met by luck, with nothing that asked for it.
+        The part of brdf and caught that met by luck, with nothing that asked for it.
     foretold : ndarray, in the shape of brdf
         Variance of that part, foretold from the paths that passed near. [1/sr^2]
     one : ndarray, shape (geometries, bounces)
@@ -125,6 +127,7 @@ class Sight:
 
     brdf: np.ndarray
     caught: np.ndarray
+    tried: np.ndarray
     glints: np.ndarray
     glints_caught: np.ndarray
     foretold: np.ndarray
@@ -143,6 +146,7 @@ class Sums:
     look: Look
     brdf: np.ndarray = field(init=False)
     caught: np.ndarray = field(init=False)
+    tried: np.ndarray = field(init=False)
     glints: np.ndarray = field(init=False)
     glints_caught: np.ndarray = field(init=False)
     foretold: np.ndarray = field(init=False)
@@ -157,6 +161,7 @@ class Sums:
         shape = self.look.shape
         self.brdf = np.zeros(shape)
         self.caught = np.zeros(shape[:2], dtype=np.int64)
+        self.tried = np.zeros(shape[0], dtype=np.int64)
         self.glints, self.foretold = np.zeros(shape), np.zeros(shape)
         self.glints_caught = np.zeros(shape[:2], dtype=np.int64)
         self.one = np.zeros(shape[:2])

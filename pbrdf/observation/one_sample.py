@@ -4,19 +4,25 @@ import numpy as np
 
 from pbrdf.kernels.cones.paths import COUNT, FAR_END, SHARE
 from pbrdf.observation.bundles import send_bundles
+from pbrdf.observation.expected import Expected
 from pbrdf.observation.facets import ask_facets
 from pbrdf.observation.look import Look, Sight, Sums
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.mesh_field import MeshField
 
 
-def look_at(surface: Field | MeshField, look: Look, seed: np.random.SeedSequence) -> Sight:
+def look_at(
+    surface: Field | MeshField,
+    look: Look,
+    seed: np.random.SeedSequence,
+    expected: Expected | None = None,
+) -> Sight:
     """Look at one surface from every detector; releases the interpreter lock."""
     sample = Sums(look)
     rng = np.random.default_rng(seed)
     of_facets = look.estimator in ("facets", "paths")
     if of_facets:
-        ask_facets(surface, sample, rng)
+        ask_facets(surface, sample, rng, expected)
     counting = look.estimator == "count"
     # Only a path of two bounces and more needs bundles once the facets were asked
     if look.max_bounces > 1 or look.base.shape[1] > 0 or not of_facets:
@@ -30,6 +36,7 @@ def look_at(surface: Field | MeshField, look: Look, seed: np.random.SeedSequence
     return Sight(
         brdf=sample.brdf,
         caught=sample.caught,
+        tried=sample.tried,
         glints=sample.glints,
         glints_caught=sample.glints_caught,
         foretold=sample.foretold,

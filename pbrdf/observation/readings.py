@@ -8,6 +8,7 @@ import xarray as xr
 from pbrdf.conventions import BOUNCES, RESULT_VARIABLES, STOKES
 from pbrdf.kernels.cones import facets as observe_facets
 from pbrdf.kernels.paths import shading
+from pbrdf.observation.expected import Expected
 from pbrdf.observation.look import Look, Sight
 
 __all__ = ["Readings", "as_scan", "to_dataset"]
@@ -40,8 +41,9 @@ class Running:
 class Readings:
     """Mean and standard error of the readings over samples, added in a fixed order."""
 
-    def __init__(self, look: Look) -> None:
-        self.look = look
+    def __init__(self, look: Look, expected: Expected | None = None) -> None:
+        self.look, self.expected = look, expected
+        self.tried = np.zeros(look.size, dtype=np.int64)
         self.samples = 0
         # All bounces together stand behind the classes of bounces
         shape = (look.size, len(BOUNCES) + 1, *look.shape[2:])
@@ -66,6 +68,7 @@ class Readings:
         self._foretold += _and_total(sight.foretold)
         self._glints += _and_total(sight.glints_caught)
         self.caught += sight.caught
+        self.tried += sight.tried
         self._one = np.maximum(self._one, sight.one)
         self.energy += (sight.energy - self.energy) / self.samples
         self.counts += sight.counts
@@ -91,15 +94,32 @@ class Readings:
         few = (FEW / (FEW + self._glints))[:, :, None, None, None]
         foretold = self._steady.variance() + self._foretold / self.samples**2
         variance = few * foretold + (1.0 - few) * self._all.variance()
+        if self.expected is not None:
+            variance[:, [0, -1]] += self._one_more_hidden()[:, None]
         dark = (self.mean[..., :1, :1] == 0.0) & (variance[..., :1, :1] == 0.0)
         return np.where(dark, self._one_path()[..., None, None], np.sqrt(variance))
+
+    def _one_more_hidden(self) -> np.ndarray:
+        """Squares that stand for one facet more that is hidden than was found.
+
+        Of N points tried with a probability h of being hidden it is 1 / (N (N + 1/h)) of
+        the single bounce; (geometries, wavelengths, stokes, stokes).
+        """
+        assert self.expected is not None
+        seen, tried = self.expected.seen, np.maximum(self.tried, 1)
+        hidden = np.where(seen > 0.0, 1.0 - seen, 0.0)
+        more = 1.0 / (tried + 1.0 / np.maximum(hidden, 1e-300)) / tried
+        more /= np.maximum(seen, 1e-3) ** 2
+        squares: np.ndarray = self.mean[:, 0] ** 2 * more[:, None, None, None]
+        return squares
 
     def _one_path(self) -> np.ndarray:
         """One path in each reading (geometries, bounces and total, wavelengths)."""
         per_path = self._one / self.samples
         found = self.mean[:, :-1, :, 0, 0].sum(axis=0)
         weight = (self.caught * per_path).sum(axis=0)[:, None]
-        strength = np.divide(found, weight, out=np.ones_like(found), where=found > 0.0)
+        known = (found > 0.0) & (weight > 0.0)
+        strength = np.divide(found, weight, out=np.ones_like(found), where=known)
         one = per_path[:, :, None] * np.minimum(strength, 1.0)
         return np.concatenate([one, np.sqrt((one**2).sum(axis=1, keepdims=True))], axis=1)
 

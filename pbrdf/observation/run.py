@@ -79,6 +79,7 @@ def observe(  # noqa: PLR0913  (the public signature)
     stokes: str = "full",
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
+    variance_reduction: bool = True,
 ) -> xr.Dataset:
     """Look at a scene from each detector of a scan and find the source behind its facets.
 
@@ -109,6 +110,9 @@ def observe(  # noqa: PLR0913  (the public signature)
     start : {"detector", "source"}
         Where bundles start. From the source one bundle serves all detectors, which is
         quicker for scans of many detectors and few incidences.
+    variance_reduction : bool
+        Take the noise of the slopes off single bounces, with realisations of a
+        GaussianSurface and an estimator that asks facets; False is the plain estimator.
 
     Returns
     -------
@@ -147,6 +151,11 @@ def observe(  # noqa: PLR0913  (the public signature)
       (16), averaged over both cones, times this one number is the single bounce. Further
       bounces are those of "corners". "paths" gives each such path its own matrix: no bias,
       more noise.
+
+    Over realisations of a GaussianSurface the law of its slopes gives what facets show on
+    average if none is hidden. "facets" and "paths" take off what those of a realisation
+    show too much, times the share in sight by Smith's height-correlated rule; what is left
+    of the noise is that of hidden facets and of further bounces.
 
     With a diffuse base, light that reaches it straight from the source is asked for there;
     light mirrored on its way to the base is found from the source's end in the same way.
@@ -207,7 +216,7 @@ def observe(  # noqa: PLR0913  (the public signature)
     early = [*judged.notes, *_wide_cones(estimator, widest, slope)]
     early += opaque_drop_notes(scene.contaminants, run.waves)
     _warn(early)
-    seen = look_at_samples(run, look)
+    seen = look_at_samples(run, look, reduced=variance_reduction)
     late = [*seen.notes, *_lost_light(seen)]
     cut = _missing_light(seen, ("truncated",))
     # Told in any case, but no surprise to one who set a low limit
@@ -220,6 +229,7 @@ def observe(  # noqa: PLR0913  (the public signature)
             **look.attributes(),
             "start": "source" if look.from_source else "detector",
             "rel_error": seen.rel_error(),
+            "variance_reduction": "none" if seen.expected is None else "single bounces",
             "warnings": [*early, *late, *cut, *judged.remarks],
             "version": __version__,
             "scene": scene_text(scene),

@@ -7,10 +7,12 @@ import numpy as np
 from pbrdf.conventions import BOUNCES
 from pbrdf.memory import NODE, PROGRAM, Size, check_room
 from pbrdf.observation.beams import BeamLook
+from pbrdf.observation.expected import Expected, expected_of
 from pbrdf.observation.look import Look, Sight
 from pbrdf.observation.one_sample import look_at
 from pbrdf.observation.readings import Readings
 from pbrdf.surface import FixedSurface, GaussianSurface, MeasuredSurface, MeshSurface
+from pbrdf.tracer import arguments
 from pbrdf.tracer.asked import Run
 from pbrdf.tracer.field import Field
 from pbrdf.tracer.media import media_of_scene
@@ -51,9 +53,10 @@ def _size(look: Look) -> Size:
     )
 
 
-def look_at_samples(run: Run, look: Look) -> Readings:
-    """Look at samples until there are enough."""
-    surface = run.scene.surface
+def look_at_samples(run: Run, look: Look, *, reduced: bool) -> Readings:
+    """Look at samples until there are enough; `reduced` if known noise is taken off."""
+    surface, expected = run.scene.surface, None
+    reduced = arguments.switch("variance_reduction", reduced)
     media = media_of_scene(run.scene, run.waves)
     if media is not None:
         beams = BeamLook(scene=run.scene, media=media, look=look)
@@ -70,8 +73,9 @@ def look_at_samples(run: Run, look: Look) -> Readings:
         draw = partial(look_at, _ready(shared), look)
     else:
         assert not isinstance(surface, FixedSurface)  # a fixed surface is batched
-        draw = partial(_look_at_realization, surface, look)
-    seen = Readings(look)
+        expected = expected_of(surface, look, wanted=reduced)
+        draw = partial(_look_at_realization, surface, look, expected)
+    seen = Readings(look, expected)
     gather(
         draw, run.root, lambda sight, _: seen.add(sight), seen.rel_error,
         samples=run.samples, target=run.target, workers=run.workers, progress=run.progress,
@@ -87,7 +91,8 @@ def _ready(surface: FixedSurface) -> Field | MeshField:
 
 
 def _look_at_realization(
-    surface: GaussianSurface | MeasuredSurface, look: Look, seed: np.random.SeedSequence
-) -> Sight:
+    surface: GaussianSurface | MeasuredSurface, look: Look, expected: Expected | None,
+    seed: np.random.SeedSequence,
+) -> Sight:  # fmt: skip
     heights, rays = seed.spawn(2)
-    return look_at(Field.of(surface.sample(heights)), look, rays)
+    return look_at(Field.of(surface.sample(heights)), look, rays, expected)

@@ -71,9 +71,11 @@ def hemisphere():
     ],
 )
 def test_both_ways_give_all_elements_by_bounces(hemisphere, name, estimator, start, n_rays):
+    # With less noise a cone differs from its bin: by up to 0.2 % of M00, as the closed form
     seen = observe(
         Scene(SURFACE, MATERIALS[name]), THETA_I, **SCAN, **CONES, n_rays=n_rays,
         realizations=48, phi_i="uniform", seed=2, estimator=estimator, start=start,
+        variance_reduction=False,
     )  # fmt: skip
     z, where = scores(hemisphere(name), seen)
     # Elements of one geometry are correlated. Of 10 seeds of 7 cases the largest was 3.6

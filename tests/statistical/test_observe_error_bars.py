@@ -171,9 +171,15 @@ def test_what_was_not_followed_is_not_called_zero():
 def test_a_reading_without_a_path_has_the_error_of_one():
     """Far from the specular direction of a gentle surface no facet joins the cones."""
     gentle = GaussianSurface(shape=(32, 32), spacing=1.0, corr_length=8.0, slope_rms=0.02)
-    seen = observe(
-        Scene(gentle, Material(1.5)), 0.7, 0.2, 0.0, n_rays=320, realizations=8,
-        source_half_angle=0.004, detector_half_angle=0.004,
+    seen, known = (
+        observe(
+            Scene(gentle, Material(1.5)), 0.7, 0.2, 0.0, n_rays=320, realizations=8,
+            source_half_angle=0.004, detector_half_angle=0.004, variance_reduction=wanted,
+        )
+        for wanted in (False, True)
     )  # fmt: skip
     assert seen.brdf_total[0, 0, 0].item() == 0.0
     assert 0.0 < seen.brdf_total_stderr[0, 0, 0].item() < np.inf
+    # The law of the slopes tells how dark it is
+    assert 0.0 <= known.brdf_total[0, 0, 0].item() < 1e-30
+    assert np.isfinite(known.brdf_total_stderr).all()

@@ -31,8 +31,9 @@ from pbrdf.kernels.terrain.heightfield import (
 # Facets 2 (i rows + j) + facet in the order of a square grid of slopes: lowest slopes,
 # cells of the grid per unit of slope, first facet of each cell, and the number of facets
 SlopeTable = namedtuple("SlopeTable", "low_x low_y per_x per_y start facets rows")
-# Columns of what the facets of a material show: flux, flux with unknown visibility
-FLUX, UNKNOWN_FLUX, N_SHOWN = 0, 1, 2
+# Columns of what the facets of a material show: flux, flux with unknown visibility, and
+# flux of all points tried, whether they are seen or not
+FLUX, UNKNOWN_FLUX, TRIED_FLUX, N_SHOWN = 0, 1, 2, 3
 # Counts: facets that join the cones, points tried on them, points seen from both sides,
 # points whose rays left a finite map sideways
 N_FACETS, N_POINTS, N_SEEN, N_ASIDE, N_FACET_COUNTS = 0, 1, 2, 3, 4
@@ -186,6 +187,7 @@ def show_point(terrain, mesh, place, facet, cones, stream, name, optics, sums):
     k = lens_direction(cones.d, image, cones.half_d, cones.half_i, normal, stream, name)
     cosine = dot(normal, k)
     counts[N_POINTS] += 1
+    shown[m, TRIED_FLUX] += flux
     if cosine <= 0.0:
         return
     # Seen from the detector, and through the mirror from the source? (Only the walk over a
