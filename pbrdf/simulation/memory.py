@@ -12,6 +12,7 @@ from pbrdf.kernels.bins.bin_fits import MAX_ORDER, MIN_ORDER
 from pbrdf.kernels.paths.shading import N_RECORD
 from pbrdf.kernels.paths.spectra import N_SUMS
 from pbrdf.kernels.sights.light import N_CELL
+from pbrdf.kernels.sights.mapped import N_LOOK
 from pbrdf.memory import (
     NODE,
     PROGRAM,
@@ -24,7 +25,7 @@ from pbrdf.memory import (
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.singles.single_bounce import LEAST_DPHI, LEAST_THETA
 from pbrdf.simulation.spectra import BUFFER, WORTHWHILE
-from pbrdf.surface import GaussianSurface
+from pbrdf.surface import GaussianSurface, HeightMap
 from pbrdf.tracer import arguments
 
 __all__ = ["CURE", "OF_SIZE", "Effort", "asked_size", "at_once", "at_work", "check_run"]
@@ -145,8 +146,13 @@ def at_work(scene: Scene, size: Size, effort: Effort, *, among: int | None = Non
     finished = size.result + 8 * size.unit / size.n_stokes**2
     surface = scene.surface
     drawn_anew = isinstance(surface, GaussianSurface) and not batched
-    if effort.looks and drawn_anew and not spectral:
+    mapped = surface if clean and isinstance(surface, HeightMap) else None
+    if effort.looks and (drawn_anew or mapped is not None):
         sights = _sights(size)
+        if mapped is not None:
+            # What the points of each facet tell, and looks of each batch
+            sights += 2.0 * mapped.heights.size * size.angles * size.azimuths
+            sights += 8.0 * N_LOOK * threads * rays
         held += sights
         finished += sights + 6 * size.unit / size.n_stokes**2
     if size.azimuths > 1:

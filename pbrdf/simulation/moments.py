@@ -15,10 +15,10 @@ from pbrdf.kernels.bins.bin_fits import MAX_ORDER
 from pbrdf.kernels.bins.moments import Running, add_sample, fold_lit, fold_sample
 from pbrdf.kernels.paths import shading
 from pbrdf.kernels.paths.path_buffer import OVERFLOWED
-from pbrdf.kernels.paths.spectra import Room, add_spectrum
+from pbrdf.kernels.paths.spectra import Room, add_spectrum, shade_kept
 from pbrdf.simulation.plan import Plan, Tally
 from pbrdf.simulation.singles.balance import Balance
-from pbrdf.simulation.singles.single_bounce import SingleBounce
+from pbrdf.simulation.singles.clean import Clean
 
 # Wavelengths that one thread adds at a time, and parts of the spectrum at most
 PER_PART, MOST_PARTS = 4, 16
@@ -30,7 +30,7 @@ class Moments:
     With single bounces that do not come from the rays, `single` tells of them.
     """
 
-    def __init__(self, plan: Plan, single: SingleBounce | None = None) -> None:
+    def __init__(self, plan: Plan, single: Clean | None = None) -> None:
         shape = plan.tally_shape
         self.plan = plan
         self.balance = None if single is None else Balance(single, shape)
@@ -69,15 +69,22 @@ class Moments:
                 _by_bin(self._mean[a]), _by_bin(self._scatter[a]),
                 _by_bin(self._scatter_total[a]), albedo[a],
             )  # fmt: skip
+            if self.balance is not None:
+                self.balance.begin(a, tally, self.plan.n_rays, float(counted[a]))
             if tally.spectra:
-                add = partial(_add_part, self.plan, tally, a, int(counted[a]), running)
+                known = self.balance is not None and self.balance.serves[a]
+                add = partial(
+                    _add_part, self.plan, tally, a, int(counted[a]), running,
+                    self.balance if known else None,
+                )  # fmt: skip
                 # Each part is waited for, and its error raised
                 list(run(add, self._parts))
                 continue
             if self.plan.fold:
                 fold_sample(tally.flux[a], tally.lit[a])
             if self.balance is not None:
-                self.balance.add(a, tally, self.plan.n_rays, self._mean[a])
+                change = tally.flux[a, ..., 0, 0] * running.scale
+                self.balance.add(a, slice(None), change - self._mean[a, ..., 0, 0])
             add_sample(_by_bin(tally.flux[a]), self._matrix, running)
         self._albedo.append(albedo)
         self._energy.append(tally.energy / counted[:, None, None])
@@ -128,7 +135,8 @@ class Moments:
         one = _or_else(one, 1.0 / (self.plan.n_rays * self.samples))
         if self.balance is not None:
             # What comes without rays is known where no ray came, too
-            one[..., : self.balance.known] = 0.0
+            for of_angle, known in zip(one, self.balance.known, strict=True):
+                of_angle[:, :known] = 0.0
         return one
 
     def _by_class(self) -> np.ndarray:
@@ -254,14 +262,40 @@ def _by_bin(flux: np.ndarray) -> np.ndarray:
 
 
 def _add_part(
-    plan: Plan, tally: Tally, angle: int, counted: int, running: Running, part: _Part
-) -> None:
+    plan: Plan, tally: Tally, angle: int, counted: int, running: Running,
+    balance: Balance | None, part: _Part,
+) -> None:  # fmt: skip
     """Shade and add some wavelengths of one direction of a sample, of `counted` rays."""
     light, room = tally.spectra[angle], part.room
     if light.state[OVERFLOWED]:
         flux = tally.flux[angle]
         room = room._replace(flux=flux, by_bin=_by_bin(flux))
+    if balance is not None:
+        for w in range(part.first, part.last):
+            _add_wave(plan, tally, angle, running, balance, room, w)
+        return
     add_spectrum(
         part.first, part.last, counted, light, plan.optics, plan.fold, tally.lit[angle],
         tally.energy[angle], room, running,
     )  # fmt: skip
+
+
+def _add_wave(
+    plan: Plan, tally: Tally, angle: int, running: Running, balance: Balance, room: Room,
+    w: int,
+) -> None:  # fmt: skip
+    """Do so with one wavelength where single bounces do not come from the paths."""
+    light, here = tally.spectra[angle], slice(w, w + 1)
+    slot = w if light.state[OVERFLOWED] else 0
+    shade_kept(w, slot, light, plan.optics, tally.energy[angle], room)
+    flux = room.flux[slot : slot + 1]
+    flux[0, 0] = balance.single.bounce(plan, tally, angle, w)
+    if plan.fold:
+        fold_sample(flux, tally.lit[angle])
+    own = {
+        name: getattr(running, name)[here]
+        for name in ("mean", "scatter", "scatter_total", "albedo")
+    }
+    change = flux[..., 0, 0] * running.scale
+    balance.add(angle, here, change - own["mean"][..., 0].reshape(change.shape))
+    add_sample(_by_bin(flux), room.matrix, running._replace(**own))

@@ -15,8 +15,16 @@ from pbrdf.simulation import memory
 from pbrdf.simulation.memory import OF_SIZE, Effort, asked_size, check_run
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.results import judged_before, labelled
-from pbrdf.simulation.run import planned, prepared, simulate, traced, wants_looks
-from pbrdf.simulation.samples import Ready, trace_samples
+from pbrdf.simulation.run import (
+    facets_of,
+    planned,
+    prepared,
+    simulate,
+    traced,
+    wants_looks,
+)
+from pbrdf.simulation.samples import Ready, Singles, trace_samples
+from pbrdf.simulation.singles.mapped import MappedSingle
 from pbrdf.simulation.singles.single_bounce import SingleBounce, can_do_without
 from pbrdf.surface import Surface
 from pbrdf.tracer import arguments
@@ -164,10 +172,13 @@ def simulate_together(
         each.append(planned(whole=False, **bound.arguments))
     _check_all(each)
     plans, first = _joined(each), each[0]
-    single = None
+    single: Singles = None
     if wants_looks(first.run, first.given) and can_do_without(surface, first.plans[0]):
         single = [SingleBounce.of(surface, plan) for plan in plans]
     judged = [judged_before(one) for one in each]
+    target = facets_of(first)
+    if target is not None:
+        single = [MappedSingle.of(target, plan) for plan in plans]
     moments, done = trace_samples(first.run, plans, single)
     found, at = [], 0
     for one, notes in zip(each, judged, strict=True):

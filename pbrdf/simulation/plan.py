@@ -1,7 +1,7 @@
 """What is traced over one surface sample, and the tally that comes back."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from pbrdf.conventions import BOUNCES
 from pbrdf.kernels.bodies.world import Media
 from pbrdf.kernels.paths import shading
+from pbrdf.kernels.paths.path_buffer import WITHOUT_SINGLE
 from pbrdf.kernels.paths.spectra import N_SUMS, Spectra
 from pbrdf.simulation.spectra import WORTHWHILE, Spectrum
 
@@ -151,7 +152,7 @@ class Tally:
     plan has a spectrum, `spectra` holds the light of each direction before it is shaded,
     and the flux means nothing but where one has overflowed into it. `single` (angles,
     n_theta, n_dphi) is the flux of single bounces if facets reflected all, where it did not
-    come from the rays.
+    come from the rays; `seen` then tells what else there is to know of them, by direction.
     """
 
     flux: np.ndarray
@@ -160,6 +161,7 @@ class Tally:
     counts: np.ndarray
     single: np.ndarray
     spectra: tuple[Spectra, ...] = ()
+    seen: list[np.ndarray] = field(default_factory=list)
     reports: tuple[Mapping[str, Any], ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -168,17 +170,23 @@ class Tally:
         """Nothing traced yet."""
         angles, wavelengths, *by_bounces = plan.tally_shape[:5]
         shared = plan.spectrum
+        spectra = tuple(
+            shared.room(index, plan.max_bounces) for index in range(angles) if shared
+        )
         return cls(
             # Memory that nobody writes to costs nothing
             flux=(np.empty if shared else np.zeros)(plan.tally_shape),
-            spectra=tuple(
-                shared.room(index, plan.max_bounces) for index in range(angles) if shared
-            ),
+            spectra=spectra,
             lit=np.zeros((angles, *by_bounces), dtype=bool),
             energy=np.zeros((angles, wavelengths, shading.N_ENERGIES)),
             counts=np.zeros((angles, shading.N_COUNTS), dtype=np.int64),
             single=np.full((angles, *by_bounces[1:]), np.nan),
         )
+
+    def leave_out(self, known: np.ndarray) -> None:
+        """Leave single bounces of directions (angles,) out of what waits to be shaded."""
+        for light, one in zip(self.spectra, known, strict=False):
+            light.state[WITHOUT_SINGLE] = one
 
     def emptied(self) -> "Tally":
         """Give the same arrays for another sample; `Moments.add` has cleared the flux."""

@@ -32,6 +32,7 @@ from pbrdf.scene.write import scene_text
 from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.samples import Ready, Singles
+from pbrdf.simulation.singles.mapped import MappedSingle
 from pbrdf.simulation.singles.wet import BesideBodies
 from pbrdf.simulation.skips import explanation, mesh_explanation
 from pbrdf.simulation.waves import join_waves
@@ -250,6 +251,8 @@ def _reduction(single: Singles) -> str:
     """Name what makes the noise less."""
     if single is None:
         return "none"
+    if isinstance(single[0], MappedSingle):
+        return "single bounces by facet"
     beside = isinstance(single[0], BesideBodies)
     return "single bounces beside bodies" if beside else "single bounces"
 

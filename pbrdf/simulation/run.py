@@ -16,6 +16,7 @@ from pbrdf.simulation.pilot import choose
 from pbrdf.simulation.plan import Plan
 from pbrdf.simulation.results import judged_before, labelled
 from pbrdf.simulation.samples import Ready, Singles, trace_samples
+from pbrdf.simulation.singles.mapped import MappedSingle, map_of_facets
 from pbrdf.simulation.singles.single_bounce import without_rays
 from pbrdf.simulation.singles.wet import beside_bodies
 from pbrdf.simulation.skips import chosen_skips
@@ -23,6 +24,8 @@ from pbrdf.simulation.waves import check_waves
 from pbrdf.surface import MeshSurface
 from pbrdf.tracer import arguments
 from pbrdf.tracer.asked import Run
+from pbrdf.tracer.embree import EmbreeField
+from pbrdf.tracer.field import Field
 from pbrdf.tracer.media import media_of_scene
 from pbrdf.wave import WaveModel
 
@@ -118,8 +121,9 @@ def simulate(  # noqa: PLR0913  (the public signature)
         Gaussian surfaces at given wavelengths. Later bounces are those of the rays.
     variance_reduction : bool
         Take single bounces on a GaussianSurface from the known law of its slopes and from
-        looks at facets of given slopes, or beside drops and spheres the noise of the slopes
-        off them, see the notes; False is the plain estimator.
+        looks at facets of given slopes, those on a HeightMap from all of its facets, or
+        beside drops and spheres the noise of the slopes off them, see the notes; False is
+        the plain estimator.
 
     Returns
     -------
@@ -153,6 +157,9 @@ def simulate(  # noqa: PLR0913  (the public signature)
     of the noise falls by one to three orders of magnitude; where no facet hides another
     nothing is left of it. Rays give the other bounces, scaled so that no light is lost.
 
+    Over a HeightMap they are a sum over its facets, each by what a few of its points see,
+    and looks at random points correct it.
+
     Beside drops and spheres on a GaussianSurface single bounces come from the rays, less
     what the same rays over the clean surface tell of the noise of its slopes.
 
@@ -178,7 +185,14 @@ def prepared(*, whole: bool = True, **given: Any) -> Ready:
     single: Singles = without_rays(scene, plans, wanted=wanted)
     if single is None:
         single = beside_bodies(scene, plans, ready.run.samples, wanted=wanted)
-    return replace(ready, single=single)
+    return replace(ready, single=single, target=facets_of(ready))
+
+
+def facets_of(ready: Ready) -> Field | EmbreeField | None:
+    """Return the map of a run if its facets are to give the single bounces."""
+    given, run = ready.given, ready.run
+    wanted = given["variance_reduction"] and given["wave"] is None
+    return map_of_facets(run.scene.surface, ready.plans, run.samples, wanted=wanted)
 
 
 def wants_looks(run: Run, given: Mapping[str, Any]) -> bool:
@@ -218,6 +232,10 @@ def planned(*, whole: bool = True, **given: Any) -> Ready:
 def traced(ready: Ready) -> xr.Dataset:
     """Trace the samples of a run, and label what they gave."""
     early = judged_before(ready)
+    if ready.target is not None:
+        # Not before the map was judged, and only for the directions of this part
+        single = [MappedSingle.of(ready.target, plan) for plan in ready.plans]
+        ready = replace(ready, single=single)
     return labelled(ready, *trace_samples(ready.run, ready.plans, ready.single), early)
 
 

@@ -12,6 +12,8 @@ import numpy as np
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.moments import Moments
 from pbrdf.simulation.plan import Plan, Tally
+from pbrdf.simulation.singles.clean import Clean
+from pbrdf.simulation.singles.mapped import MappedSingle
 from pbrdf.simulation.singles.single_bounce import SingleBounce
 from pbrdf.simulation.singles.wet import BesideBodies
 from pbrdf.simulation.trace import Target, prepare, trace_sample
@@ -25,14 +27,15 @@ from pbrdf.tracer.wet_field import WetField
 from pbrdf.tracer.wet_mesh import WetMesh
 
 # What is known of the single bounces of each plan
-Singles = Sequence[SingleBounce | BesideBodies] | None
+Singles = Sequence[SingleBounce | MappedSingle | BesideBodies] | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ready:
     """A run that is checked and planned, as its arguments say.
 
-    `chosen` says how a plan was chosen; `given` holds the arguments of `simulate`.
+    `chosen` says how a plan was chosen; `given` holds the arguments of `simulate`; `target`
+    is the map if its facets are to give the single bounces.
     """
 
     run: Run
@@ -41,6 +44,7 @@ class Ready:
     single: Singles
     chosen: list[str]
     given: dict[str, Any]
+    target: Field | EmbreeField | None = None
 
     def part(self, first: int, last: int) -> "Ready":
         """Return the run of some of the directions, with the rays they have among all."""
@@ -69,14 +73,22 @@ def trace_samples(
     """Trace samples until there are enough: the moments of each plan, and how many."""
     # Tallies to use again: to make a large one costs more than to clear it
     spare: deque[Tally] = deque()
-    if run.batched:
+    clean: list[Clean] = []
+    for one, plan in zip(single or (), plans, strict=False):
+        if isinstance(one, SingleBounce):
+            clean.append(one.with_light(plan))
+        elif isinstance(one, MappedSingle):
+            clean.append(one)
+    if single and isinstance(single[0], MappedSingle):
+        draw = partial(_trace_map, single[0].target, plans, clean, spare)
+    elif run.batched:
         # The surface, or the one realisation asked for, stays the same in all batches
         first = run.root.spawn(1)[0] if arguments.varies(run.scene) else run.root
         draw = partial(_trace_fixed, _realize(run.scene, plans[0], first), plans, spare)
     else:
-        draw = partial(_trace_realization, run.scene, plans, single, spare)
+        draw = partial(_trace_realization, run.scene, plans, clean or single, spare)
     moments = [Moments(one) for one in plans]
-    if clean := [one for one in single or () if isinstance(one, SingleBounce)]:
+    if clean:
         moments = [Moments(*both) for both in zip(plans, clean, strict=True)]
 
     def add(tallies: Sequence[Tally], each: Callable[..., Iterable[Any]]) -> None:
@@ -110,11 +122,11 @@ def _realize(scene: Scene, plan: Plan, seed: np.random.SeedSequence) -> Target:
     )  # fmt: skip
 
 
-def _taken(spare: deque[Tally]) -> Tally | None:
+def _taken(spare: deque[Tally], plan: Plan) -> Tally:
     try:
         return spare.pop()
     except IndexError:
-        return None
+        return Tally.empty(plan)
 
 
 def _trace_fixed(
@@ -124,13 +136,51 @@ def _trace_fixed(
     seed: np.random.SeedSequence,
 ) -> list[Tally]:
     """One sample of every azimuth: the same surface, streams and entry points."""
-    return [trace_sample(target, plan, seed, _taken(spare)) for plan in plans]
+    return [trace_sample(target, plan, seed, _taken(spare, plan)) for plan in plans]
+
+
+def _trace_map(
+    target: Field | EmbreeField,
+    plans: Sequence[Plan],
+    single: Sequence[Clean],
+    spare: deque[Tally],
+    seed: np.random.SeedSequence,
+) -> list[Tally]:
+    """Do so with single bounces from the facets of the map."""
+    # The rays are those of the plain estimator
+    return _trace_clean(target, plans, single, spare, (seed, seed.spawn(1)[0]))
+
+
+def _trace_clean(
+    target: Field | EmbreeField | None,
+    plans: Sequence[Plan],
+    single: Sequence[Clean],
+    spare: deque[Tally],
+    seeds: tuple[np.random.SeedSequence, np.random.SeedSequence],
+) -> list[Tally]:
+    """One sample whose single bounces do not come from its rays; seeds of these and looks.
+
+    Without a target no ray is traced.
+    """
+    tallies = []
+    for plan, one in zip(plans, single, strict=True):
+        tallies.append(_taken(spare, plan))
+        # Azimuths share the tallies, but not what is known
+        tallies[-1].leave_out(one.serves())
+    terrain = None
+    if target is not None and not all(one.everything for one in single):
+        rays = zip(plans, tallies, strict=True)
+        tallies = [trace_sample(target, plan, seeds[0], tally) for plan, tally in rays]
+        terrain = (target if isinstance(target, Field) else target.field).terrain
+    for plan, one, tally in zip(plans, single, tallies, strict=True):
+        one.add(terrain, plan, seeds[1], tally)
+    return tallies
 
 
 def _trace_realization(
     scene: Scene,
     plans: Sequence[Plan],
-    single: Singles,
+    single: Sequence[Clean | BesideBodies] | None,
     spare: deque[Tally],
     seed: np.random.SeedSequence,
 ) -> list[Tally]:
@@ -139,18 +189,12 @@ def _trace_realization(
         return _trace_fixed(_realize(scene, plans[0], heights), plans, spare, rays)
     if beside := [one for one in single if isinstance(one, BesideBodies)]:
         return _trace_beside_bodies(scene, plans, beside, spare, (heights, rays, looks))
-    clean = [one for one in single if isinstance(one, SingleBounce)]
+    clean = [one for one in single if not isinstance(one, BesideBodies)]
     if all(one.everything for one in clean):
-        tallies = [_taken(spare) or Tally.empty(plan) for plan in plans]
-        terrain = None
-    else:
-        target = _realize(scene, plans[0], heights)
-        tallies = _trace_fixed(target, plans, spare, rays)
-        assert isinstance(target, (Field, EmbreeField))  # no bodies on it
-        terrain = (target if isinstance(target, Field) else target.field).terrain
-    for plan, one, tally in zip(plans, clean, tallies, strict=True):
-        one.add(terrain, plan, looks, tally)
-    return tallies
+        return _trace_clean(None, plans, clean, spare, (rays, looks))
+    target = _realize(scene, plans[0], heights)
+    assert isinstance(target, (Field, EmbreeField))  # no bodies on it
+    return _trace_clean(target, plans, clean, spare, (rays, looks))
 
 
 def _trace_beside_bodies(

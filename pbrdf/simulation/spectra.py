@@ -7,6 +7,7 @@ import numpy as np
 from pbrdf.kernels.bins.bin_fits import MAX_ORDER, choose_orders, cosine_ranges
 from pbrdf.kernels.optics.fresnel_table import FresnelTable, build_table
 from pbrdf.kernels.paths import spectra as kernel
+from pbrdf.kernels.paths.path_buffer import N_STATES
 from pbrdf.kernels.paths.shading import N_RECORD
 
 # From this many wavelengths on, sums by bin cost less than every path shaded for each
@@ -93,6 +94,6 @@ class Spectrum:
             self.bins[index],
             np.zeros((self.table.n.shape[1], self.sizes[index])),
             np.empty((max(BUFFER, max_bounces + 2), 1, N_RECORD)),
-            np.zeros(2, dtype=np.int64),
+            np.zeros(N_STATES, dtype=np.int64),
             self.table, POINTS, POWERS, np.empty((4, MAX_ORDER)),
         )  # fmt: skip

@@ -63,7 +63,7 @@ class Field:
 
     terrain: Terrain
     z_bottom: float
-    _entries: dict[tuple[float, ...], np.ndarray] = field(
+    _entries: dict[tuple[float, ...], tuple[np.ndarray, bool]] = field(
         default_factory=dict, repr=False, compare=False
     )
 
@@ -130,6 +130,15 @@ class Field:
         if self.periodic:
             self._refuse_grazing(theta_i + half_angle)
             return np.array([0.0, 0.0, nx, ny])
+        return self._entry(theta_i, phi_i, half_angle)[0]
+
+    def is_guarded(self, theta_i: float, phi_i: float | None) -> bool:
+        """Whether hardly any light leaves sideways, the entry rectangle being so narrow."""
+        return self.periodic or self._entry(theta_i, phi_i, 0.0)[1]
+
+    def _entry(
+        self, theta_i: float, phi_i: float | None, half_angle: float
+    ) -> tuple[np.ndarray, bool]:
         known = (theta_i, np.inf if phi_i is None else phi_i, half_angle)
         if known not in self._entries:
             self._entries[known] = self._inner_rectangle(theta_i, phi_i, half_angle)
@@ -153,7 +162,7 @@ class Field:
 
     def _inner_rectangle(
         self, theta_i: float, phi_i: float | None, half_angle: float
-    ) -> np.ndarray:
+    ) -> tuple[np.ndarray, bool]:
         nx, ny = self.terrain.heights.shape
         height_range = self.height_range
         sides = np.array([nx - 1.0, ny - 1.0])
@@ -187,6 +196,6 @@ class Field:
         ):
             low, lengths = before - below, sides - before - behind - above + below
             if lengths.min() > 0.0 and lengths.prod() >= LEAST_INTERIOR * sides.prod():
-                return np.concatenate([low, lengths])
+                return np.concatenate([low, lengths]), True
         # None is wide enough: the narrow rim, and what leaves sideways is told
-        return narrow
+        return narrow, False

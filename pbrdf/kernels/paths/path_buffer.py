@@ -28,8 +28,9 @@ from pbrdf.kernels.paths.shading import (
 
 # First row of a path in the buffer, before its records: fate, bounces, bin
 P_END, P_BOUNCES, P_THETA, P_DPHI = 0, 1, 2, 3
-# State of the buffer: rows in use, and whether it has overflowed
-FILL, OVERFLOWED = 0, 1
+# State of the buffer: rows in use, whether it has overflowed, and whether single bounces
+# do not come from paths
+FILL, OVERFLOWED, WITHOUT_SINGLE, N_STATES = 0, 1, 2, 3
 
 
 @jit(forceinline=True)

@@ -19,7 +19,12 @@ from collections import namedtuple
 from pbrdf.kernels import jit
 from pbrdf.kernels.bins.moments import add_wavelength, fold_wavelength
 from pbrdf.kernels.optics.fresnel_table import table_elements
-from pbrdf.kernels.paths.path_buffer import OVERFLOWED, keep_path, shade_paths
+from pbrdf.kernels.paths.path_buffer import (
+    OVERFLOWED,
+    WITHOUT_SINGLE,
+    keep_path,
+    shade_paths,
+)
 from pbrdf.kernels.paths.shading import (
     ABSORBED,
     COS_IN,
@@ -42,8 +47,8 @@ BIN_START, BIN_ORDER, BIN_MID, BIN_SCALE, N_BIN = 0, 1, 2, 3, 4
 # takes it; a matrix (4, 4), its elements (stokes ** 2,) and elements at points (4,
 # MAX_ORDER)
 Room = namedtuple("Room", "flux by_bin mueller matrix factors")
-# bins (n_theta, n_dphi, N_BIN); sums (materials, size); paths and state (2,), the buffer
-# of `pbrdf.kernels.paths.path_buffer`; the `FresnelTable`; points and powers:
+# bins (n_theta, n_dphi, N_BIN); sums (materials, size); paths and state (N_STATES,), the
+# buffer of `pbrdf.kernels.paths.path_buffer`; the `FresnelTable`; points and powers:
 # Chebyshev points (MAX_ORDER + 1, MAX_ORDER) and the matrices from values there to the
 # factors of the powers; room for elements at the points
 Spectra = namedtuple("Spectra", "bins sums paths state table points powers factors")
@@ -99,6 +104,8 @@ def gather_path(end, record, ray, bounces, i_theta, i_dphi, spectra, optics, tal
     tally.counts[N_ORDERS + order] += 1
     tally.lit[order, i_theta, i_dphi] = True
     once = bounces == 1 and record[0, ray, COS_OUT] == SPECULAR
+    if once and spectra.state[WITHOUT_SINGLE]:
+        return
     if once and spectra.bins[i_theta, i_dphi, BIN_ORDER] > 0.0:
         add_bounce(record, ray, i_theta, i_dphi, optics.n_stokes, spectra)
     else:
@@ -261,3 +268,13 @@ def add_spectrum(first, last, n_units, spectra, optics, fold, lit, energy, room,
         if fold:
             fold_wavelength(room.flux, slot, lit)
         add_wavelength(room.by_bin, slot, w, room.matrix, running)
+
+
+@jit(allocates=False)
+def shade_kept(w, slot, spectra, optics, energy, room):
+    """Shade the paths of a sample that wait, at one wavelength, into a slot of the flux.
+
+    energy          of the sample (wavelengths, N_ENERGIES), completed but for what comes of
+                    single bounces
+    """
+    shade_paths(w, spectra, optics, room.flux, slot, energy, room.mueller)

@@ -58,17 +58,16 @@ def distance(law, slope_x, slope_y):
 
 
 @jit(forceinline=True)
-def strength(law, way, facet):
+def strength(law, cos_i, tan2_tilt, slope_x, slope_y):
     """Flux per solid angle and incident flux of facets that reflect all, none hidden."""
-    square = distance(law, facet.slope_x, facet.slope_y)
-    stretch = 1.0 + facet.tan2_tilt
-    return law.norm * exp(-0.5 * square * square) * stretch * stretch / (4.0 * way.cos_i)
+    square = distance(law, slope_x, slope_y)
+    stretch = 1.0 + tan2_tilt
+    return law.norm * exp(-0.5 * square * square) * stretch * stretch / (4.0 * cos_i)
 
 
 @jit(forceinline=True)
-def hidden_share(law, way, theta_s, dphi, cos_phi, sin_phi):
-    """Sum of Smith's Lambda of the source and of a direction (theta_s, dphi)."""
-    cos_d, sin_d = cos(dphi), sin(dphi)
+def hidden_share(law, way, cos_d, sin_d, cos_phi, sin_phi):
+    """Sum of Smith's Lambda of a source and of a direction at dphi from it."""
     return overhang(law, way.cos_i, way.sin_i, cos_phi, sin_phi) + overhang(
         law, way.cos_s, way.sin_s,
         cos_phi * cos_d - sin_phi * sin_d, sin_phi * cos_d + cos_phi * sin_d,
@@ -76,11 +75,21 @@ def hidden_share(law, way, theta_s, dphi, cos_phi, sin_phi):
 
 
 @jit(forceinline=True)
+def turned_slopes(facet, cos_phi, sin_phi):
+    """Slopes of the facet of a source at azimuth 0, turned with the source."""
+    x, y = facet.slope_x, facet.slope_y
+    return x * cos_phi - y * sin_phi, x * sin_phi + y * cos_phi
+
+
+@jit(forceinline=True)
 def seen_strength(law, theta_i, theta_s, dphi, cos_phi, sin_phi):
     """Flux per theta_s and dphi of unit facets that Smith's rule leaves in sight."""
-    way = directions(theta_i, theta_s, dphi, cos_phi, sin_phi)
-    hidden = hidden_share(law, way, theta_s, dphi, cos_phi, sin_phi)
-    return strength(law, way, mirror_facet(way)) * way.sin_s / (1.0 + hidden)
+    way = directions(theta_i, theta_s, dphi, 1.0, 0.0)
+    hidden = hidden_share(law, way, cos(dphi), sin(dphi), cos_phi, sin_phi)
+    facet = mirror_facet(way)
+    slope_x, slope_y = turned_slopes(facet, cos_phi, sin_phi)
+    flux = strength(law, way.cos_i, facet.tan2_tilt, slope_x, slope_y)
+    return flux * way.sin_s / (1.0 + hidden)
 
 
 @jit(part=True)
@@ -116,28 +125,54 @@ def write_elements(rows, n_stokes, weight, out):
 
 
 @jit(part=True)
-def add_panel(
-    law, theta_i, cos_phi, sin_phi, panel, nodes, weights, n, kappa, n_stokes, light, cell
-):
-    """Add the integral over a panel (theta_s, width, dphi, width) of one cell."""
+def add_panel(law, theta_i, phi, panel, nodes, weights, n, kappa, n_stokes, light, cell):
+    """Add the integral over a panel (theta_s, width, dphi, width) of one cell.
+
+    `phi` holds azimuths of the source; only the slopes and what hides them know of it.
+    """
     low, step, left, turn = panel
     for a in range(nodes.size):
         theta_s = low + step * nodes[a]
         for b in range(nodes.size):
             dphi = left + turn * nodes[b]
-            way = directions(theta_i, theta_s, dphi, cos_phi, sin_phi)
+            cos_d, sin_d = cos(dphi), sin(dphi)
+            way = directions(theta_i, theta_s, dphi, 1.0, 0.0)
             facet = mirror_facet(way)
-            flux = strength(law, way, facet) * way.sin_s
-            flux *= weights[a] * weights[b] * step * turn
-            cell[ALL] += flux
-            flux /= 1.0 + hidden_share(law, way, theta_s, dphi, cos_phi, sin_phi)
-            cell[SEEN] += flux
+            part = way.sin_s * weights[a] * weights[b] * step * turn
+            whole = seen = 0.0
+            for p in range(phi.size):
+                cos_phi, sin_phi = cos(phi[p]), sin(phi[p])
+                x, y = turned_slopes(facet, cos_phi, sin_phi)
+                if distance(law, x, y) > FARTHEST:
+                    continue
+                flux = part * strength(law, way.cos_i, facet.tan2_tilt, x, y)
+                whole += flux
+                seen += flux / (
+                    1.0 + hidden_share(law, way, cos_d, sin_d, cos_phi, sin_phi)
+                )
+            cell[ALL] += whole
+            cell[SEEN] += seen
+            if seen == 0.0:
+                continue
             for w in range(n.size):
                 one, two, three, four = facet_elements(
                     facet.cos_beta, facet.sin2_beta, n[w], kappa[w]
                 )
                 rows = rotated_elements(way, one, two, three, four)
-                write_elements(rows, n_stokes, flux, light[w])
+                write_elements(rows, n_stokes, seen, light[w])
+
+
+@jit(forceinline=True)
+def in_reach(law, theta_i, phi, theta_s, dphi, reach):
+    """Whether the facets about a direction are found, for some azimuth of the source."""
+    x, y = slopes_at(theta_i, theta_s, dphi)
+    for p in range(phi.size):
+        cos_phi, sin_phi = cos(phi[p]), sin(phi[p])
+        if distance(
+            law, x * cos_phi - y * sin_phi, x * sin_phi + y * cos_phi
+        ) < reach:  # fmt: skip
+            return True
+    return False
 
 
 @jit
@@ -179,17 +214,12 @@ def fill_light(theta_i, phi, law, rules, n, kappa, n_stokes, light, cells):
                         low + a * step / rows, step / rows,
                         left + b * turn / columns, turn / columns,
                     )  # fmt: skip
-                    for p in range(phi.size):
-                        cos_phi, sin_phi = cos(phi[p]), sin(phi[p])
-                        x, y = slopes_at(
-                            theta_i, panel[0] + 0.5 * panel[1], panel[2] + 0.5 * panel[3]
-                        )
-                        x, y = x * cos_phi - y * sin_phi, x * sin_phi + y * cos_phi
-                        if distance(law, x, y) < reach:
-                            add_panel(
-                                law, theta_i, cos_phi, sin_phi, panel, nodes, weights,
-                                n, kappa, n_stokes, light[i, j], cells[i, j],
-                            )  # fmt: skip
+                    theta_s, dphi = panel[0] + 0.5 * panel[1], panel[2] + 0.5 * panel[3]
+                    if in_reach(law, theta_i, phi, theta_s, dphi, reach):
+                        add_panel(
+                            law, theta_i, phi, panel, nodes, weights, n, kappa, n_stokes,
+                            light[i, j], cells[i, j],
+                        )  # fmt: skip
             if cells[i, j, ALL] == 0.0:
                 continue
             first = last = 0.0

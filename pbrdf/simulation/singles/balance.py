@@ -7,7 +7,7 @@ import numpy as np
 
 from pbrdf.kernels.paths.shading import ABSORBED, LEAKED, N_ORDERS, TRUNCATED
 from pbrdf.simulation.plan import Tally
-from pbrdf.simulation.singles.single_bounce import SingleBounce
+from pbrdf.simulation.singles.clean import Clean
 
 
 class Balance:
@@ -22,12 +22,14 @@ class Balance:
     X, spread over bins as the mean light is.
     """
 
-    def __init__(self, single: SingleBounce, shape: tuple[int, ...]) -> None:
+    def __init__(self, single: Clean, shape: tuple[int, ...]) -> None:
+        self.single = single
         # Classes of bounces of which no ray need tell: where nothing is hidden, of all
-        self.known = shape[2] if single.everything else 1
+        self.serves = single.serves()
+        self.known = np.where(single.certain(), shape[2], 1) * self.serves
         self._hidden, self._looks = single.hidden(), single.looks()
-        whole = single.among
-        self._one_of_many = whole is not None and len(whole.directions) > shape[0] == 1
+        self._doubtful = single.doubtful()
+        self._one_of_many = single.one_of_many
         # By sample: share of the rays that went on, and excess of the rays' single bounces
         self._beyond: list[np.ndarray] = []
         self._excess: list[np.ndarray] = []
@@ -45,20 +47,31 @@ class Balance:
             setattr(part, name, getattr(self, name)[own])
         return part
 
-    def add(self, angle: int, tally: Tally, n_rays: int, mean: np.ndarray) -> None:
-        """Add incident direction `angle` of a sample, before it goes into the mean flux."""
+    def begin(self, angle: int, tally: Tally, n_rays: int, counted: float) -> None:
+        """Take the shares of incident direction `angle` of a sample.
+
+        `counted` of its `n_rays` did not leave a finite map sideways.
+        """
         if angle == 0:
             self._beyond.append(np.zeros(len(tally.single)))
             self._excess.append(np.zeros(len(tally.single)))
-        alone = tally.counts[angle, N_ORDERS] / n_rays
+        alone = tally.counts[angle, N_ORDERS] / counted
         self._beyond[-1][angle] = 1.0 - alone
-        self._excess[-1][angle] = alone - tally.single[angle].sum()
-        self._unit[angle] += tally.single[angle]
+        if not self.serves[angle]:
+            return
+        unit = tally.single[angle] * (n_rays / counted)
+        self._excess[-1][angle] = alone - unit.sum()
+        self._unit[angle] += unit
+
+    def add(self, angle: int, waves: slice, change: np.ndarray) -> None:
+        """Add wavelengths of the sample whose shares were taken last.
+
+        `change` (wavelengths, bounces, n_theta, n_dphi) is its M00 less the mean before it.
+        """
         if len(self._excess) > 1:
             rest = self._excess[-1][angle] - np.mean([one[angle] for one in self._excess])
-            change = tally.flux[angle, ..., 0, 0] / n_rays - mean[..., 0, 0]
-            self._cross[angle] += change * rest
-            self._cross_total[angle] += change.sum(axis=1) * rest
+            self._cross[angle, waves] += change * rest
+            self._cross_total[angle, waves] += change.sum(axis=1) * rest
 
     def _over_samples(
         self, reduce: Callable[..., np.ndarray], values: Sequence[np.ndarray] | np.ndarray
@@ -113,12 +126,13 @@ class Balance:
     def _floor(self, mean: np.ndarray) -> np.ndarray:
         """Squares that stand for one hidden facet more than was seen, as scatter sums.
 
-        Smith's rule gives the probability h of a facet to be hidden; what N looks say of it
-        is that of one more, 1 / (N + 1/h), at most h.
+        Smith's rule gives the probability h of a facet to be hidden, or the points of the
+        facets of a map that of a look to find something amiss; what N looks say of it is
+        that of one more, 1 / (N + 1/h), at most h.
         """
         samples = len(self._excess)
         looks = np.maximum(self._looks * samples, 1)
-        more = 1.0 / (looks + 1.0 / np.maximum(self._hidden, 1e-300)) / looks
+        more = 1.0 / (looks + 1.0 / np.maximum(self._doubtful, 1e-300)) / looks
         more *= samples * (samples - 1) / np.maximum(1.0 - self._hidden, 1e-3) ** 2
         squares: np.ndarray = mean[:, :, 0] ** 2 * more[:, None, :, :, None, None]
         return squares
@@ -136,7 +150,7 @@ class Balance:
 
     def energy(self, energy: np.ndarray, albedo: np.ndarray) -> np.ndarray:
         """Energies (angles, wavelengths, fates) in balance with all that is reflected."""
-        energy = energy.copy()
+        before, energy = energy, energy.copy()
         further, _ = self._parts()
         scale = 1.0 + self._over_samples(np.mean, self._excess) * further
         for fate in (TRUNCATED, LEAKED):
@@ -144,7 +158,7 @@ class Balance:
         rest = 1.0 - albedo.sum(axis=-1) - energy[..., TRUNCATED] - energy[..., LEAKED]
         # What a mirror absorbs is nothing but rounding
         energy[..., ABSORBED] = np.where(np.abs(rest) < 1e-14, 0.0, rest)
-        return energy
+        return np.where(self.serves[:, None, None], energy, before)
 
 
 def _adjust(

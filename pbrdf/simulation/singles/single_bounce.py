@@ -10,7 +10,7 @@ of further bounces go through, by facets of fitting slopes put at random places.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeGuard
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -66,7 +66,6 @@ def can_do_without(surface: Surface, plan: Plan) -> TypeGuard[GaussianSurface]:
         isinstance(surface, GaussianSurface)
         and plan.media is None
         and plan.base.shape[1] == 0
-        and len(plan.n) < WORTHWHILE
         and plan.half_angle == 0.0
         and min(surface.facet_slope_rms) >= NARROWEST
     )
@@ -79,7 +78,8 @@ class Direction:
     Attributes
     ----------
     light : ndarray, shape (wavelengths, cells, cells, elements)
-        Flux into cells of directions under Smith's rule, of one unit that comes in. [1]
+        Flux into cells of directions under Smith's rule, of one unit that comes in; of no
+        wavelengths where these are many and not yet needed. [1]
     cells : ndarray, shape (cells, cells, N_CELL)
         Flux of facets that reflect all, with and without hiding; see the kernel.
     wanted : ndarray of bool, shape (cells, cells)
@@ -125,6 +125,18 @@ class SingleBounce:
         """Return those of some directions."""
         return replace(self, directions=self.directions[first:last], among=self)
 
+    def with_light(self, plan: Plan) -> "SingleBounce":
+        """Return those of a plan of the same directions with the light of wavelengths."""
+        if all(len(one.light) == len(plan.n) for one in self.directions):
+            return self
+        directions = tuple(
+            # Too large to be kept for other runs
+            replace(one, light=_averaged.__wrapped__(*_what(theta, law, plan, plan.n))[0])
+            for law in [self.ensemble.law]
+            for theta, one in zip(plan.theta_i, self.directions, strict=True)
+        )
+        return replace(self, directions=directions, among=self.among or self)
+
     def of_waves(self, first: int, last: int) -> "SingleBounce":
         """Return those of some wavelengths; facets are seen alike at all."""
         directions = tuple(
@@ -136,7 +148,7 @@ class SingleBounce:
     def of(cls, surface: GaussianSurface, plan: Plan) -> "SingleBounce":
         """Integrate over the slope law for every direction and wavelength of a plan."""
         ensemble = facet_ensemble(surface)
-        parts = -(-LEAST_THETA // plan.n_theta), -(-LEAST_DPHI // plan.n_dphi)
+        parts = cell_parts(plan)
         along_x, along_y = (
             np.concatenate([c[1:2], c, c[:1]])
             for c in (surface.correlation(0), surface.correlation(1))
@@ -155,6 +167,24 @@ class SingleBounce:
         directions = (self if self.among is None else self.among).directions
         seen = [one.cells[..., SEEN].sum() for one in directions]
         return bool(np.abs(1.0 - np.array(seen)).max() < 10 * NOTHING)
+
+    @property
+    def one_of_many(self) -> bool:
+        """Whether they are of one direction among several."""
+        whole = self.among
+        return whole is not None and len(whole.directions) > len(self.directions) == 1
+
+    def certain(self) -> np.ndarray:
+        """Say of each direction whether nothing is hidden in any (angles,)."""
+        return np.full(len(self.directions), self.everything)
+
+    def serves(self) -> np.ndarray:
+        """Say that they are known of all directions (angles,)."""
+        return np.full(len(self.directions), fill_value=True)
+
+    def doubtful(self) -> np.ndarray:
+        """Return the probability that a look tells of a hidden facet (as `hidden`)."""
+        return self.hidden()
 
     def hidden(self) -> np.ndarray:
         """Return the share of a bin that Smith's rule hides (angles, n_theta, n_dphi)."""
@@ -227,12 +257,17 @@ class SingleBounce:
                 seen = np.ones(one.wanted.shape)
             else:
                 seen = self._look(terrain, plan, a, streams[a])
-            for w, light in enumerate(one.light):
-                flux = self.by_bin(light * seen[..., None])
-                tally.flux[a, w, 0] = (plan.n_rays * flux).reshape(tally.flux.shape[3:])
+            tally.seen[a:] = [seen]
+            for w in range(0 if tally.spectra else len(one.light)):
+                tally.flux[a, w, 0] = self.bounce(plan, tally, a, w)
             unit = one.cells[..., SEEN]
             tally.lit[a, 0] = self.by_bin(unit[..., None])[..., 0] > 0.0
             tally.single[a] = self.by_bin((unit * seen)[..., None])[..., 0]
+
+    def bounce(self, plan: Plan, tally: Tally, angle: int, wave: int) -> np.ndarray:
+        """Return those of a sample (n_theta, n_dphi, stokes, stokes), in rays of light."""
+        light = self.directions[angle].light[wave] * tally.seen[angle][..., None]
+        return plan.n_rays * self.by_bin(light).reshape(tally.flux.shape[3:])
 
     def _look(
         self, terrain: Terrain, plan: Plan, angle: int, stream: np.uint64
@@ -254,18 +289,29 @@ class SingleBounce:
 def _direction(
     theta: float, law: SlopeLaw, plan: Plan, parts: tuple[int, int]
 ) -> Direction:
-    shape = plan.n_theta * parts[0], plan.n_dphi * parts[1]
-    indices = tuple(zip(plan.n[:, 0].tolist(), plan.kappa[:, 0].tolist(), strict=True))
-    light, cells = _averaged(
-        float(theta), plan.phi_i, law, (plan.n_theta, plan.n_dphi), shape,
-        (indices, plan.n_stokes),
-    )  # fmt: skip
+    few = len(plan.n) < WORTHWHILE
+    light, cells = _averaged(*_what(theta, law, plan, plan.n if few else plan.n[:0]))
     wanted, places = _places(cells, plan.n_rays * PLACES_PER_RAY, parts)
     flux = np.where(wanted, cells[..., SEEN], 0.0)
     change = (flux * cells[..., RISE_DPHI]).sum(axis=0) / np.maximum(
         flux.sum(axis=0), 1e-300
     )
     return Direction(light=light, cells=cells, wanted=wanted, places=places, change=change)
+
+
+def cell_parts(plan: Plan) -> tuple[int, int]:
+    """Count the cells of a bin along theta_s and dphi."""
+    return -(-LEAST_THETA // plan.n_theta), -(-LEAST_DPHI // plan.n_dphi)
+
+
+def _what(theta: float, law: SlopeLaw, plan: Plan, n: np.ndarray) -> tuple[Any, ...]:
+    """Say what is integrated, at the wavelengths of n: arguments of `_averaged`."""
+    kappa = plan.kappa[: len(n), 0].tolist()
+    bins, parts = (plan.n_theta, plan.n_dphi), cell_parts(plan)
+    return (
+        float(theta), plan.phi_i, law, bins, (bins[0] * parts[0], bins[1] * parts[1]),
+        (tuple(zip(n[:, 0].tolist(), kappa, strict=True)), plan.n_stokes),
+    )  # fmt: skip
 
 
 # Runs that differ in their seeds or rays share their integrals
@@ -279,7 +325,7 @@ def _averaged(
     index: tuple[tuple[tuple[float, float], ...], int],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Light and cells of one zenith angle, averaged over azimuths if they are spread."""
-    (n, kappa), n_stokes = np.array(index[0]).T.copy(), index[1]
+    (n, kappa), n_stokes = np.array(index[0]).reshape(-1, 2).T.copy(), index[1]
     left = -np.pi / bins[1]
 
     def at(phi: Sequence[float] | np.ndarray, cells: np.ndarray) -> np.ndarray:
