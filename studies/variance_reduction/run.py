@@ -12,15 +12,24 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 from scipy.stats import norm
 
 from pbrdf import Drops, GaussianSurface, Material, Scene, Spheres, simulate
 from pbrdf.bench.__main__ import machine
 from pbrdf.errors import AccuracyWarning
+from pbrdf.observation import observe
 
 OUTPUT = Path(__file__).parent / "output"
 GLASS, WATER = Material(1.5), Material(1.333)
 BINS = {"n_theta": 9, "n_dphi": 18}
+WAVES = np.linspace(0.4, 0.7, 5)
+COLOURED = Material.from_table(
+    wavelength=WAVES, n=1.4 + 0.1 * np.arange(5), kappa=0.5 * np.arange(5)
+)
+# Detectors of the goniometer [degrees], and its cones [rad]
+DETECTORS = np.array([60.0, 45.0, 70.0, 30.0]), np.array([180.0, 180.0, 180.0, 120.0])
+CONES = {"source_half_angle": 0.05, "detector_half_angle": 0.05}
 # Bins above this part of the peak count, and elements above this part of M00
 BRIGHT, STRONG = 0.1, 0.01
 FALSE_ALARM = 0.01
@@ -52,25 +61,45 @@ CASES: dict[str, tuple[Callable[[], Scene], float, dict[str, object]]] = {
         41.4,
         {"phi_i": 0.6},
     ),
+    # Five wavelengths are summed by bin
+    "spectral": (lambda: Scene(surface(0.3), COLOURED), 60.0, {"wavelength": WAVES}),
+    # One map: realisations are so many times more rays
+    "map": (lambda: Scene(surface(0.3).sample(7), GLASS), 60.0, {"phi_i": 0.6}),
+    # Readings of a goniometer
+    "readings": (lambda: Scene(surface(0.3), GLASS), 60.0, {"phi_i": 0.6}),
 }
+
+
+def run_once(case: str, **options: object) -> xr.Dataset:
+    """Simulate a case, or observe it."""
+    scene, theta_i, given = CASES[case]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AccuracyWarning)
+        if case == "readings":
+            theta_s, dphi = (np.deg2rad(angles) for angles in DETECTORS)
+            return observe(
+                scene(), np.full(len(dphi), np.deg2rad(theta_i)), theta_s, dphi,
+                **CONES, **given, **options,
+            )  # fmt: skip
+        return simulate(scene(), np.deg2rad(theta_i), **BINS, **given, **options)
 
 
 def runs(
     case: str, seeds: range, realizations: int, n_rays: int, *, reduced: bool
 ) -> dict[str, np.ndarray]:
     """BRDF of all bounces apart and together, and stated errors, by seed."""
-    scene, theta_i, options = CASES[case]
     found: dict[str, list[np.ndarray]] = {"value": [], "error": []}
     for seed in seeds:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", AccuracyWarning)
-            result = simulate(
-                scene(), np.deg2rad(theta_i), n_rays=n_rays, realizations=realizations,
-                seed=seed, variance_reduction=reduced, **BINS, **options,
-            )  # fmt: skip
+        result = run_once(
+            case, n_rays=n_rays, realizations=realizations, seed=seed,
+            variance_reduction=reduced,
+        )  # fmt: skip
         for name, end in (("value", ""), ("error", "_stderr")):
-            by_bounces = result[f"brdf{end}"].values[:, 0]
-            total = result[f"brdf_total{end}"].values[:1]
+            by_bounces = result[f"brdf{end}"]
+            total = result[f"brdf_total{end}"]
+            if "theta_i" in result.dims:
+                by_bounces, total = by_bounces.isel(theta_i=0), total.isel(theta_i=0)
+            by_bounces, total = by_bounces.values, total.values[None]
             found[name].append(np.concatenate([by_bounces, total]))
     return {name: np.array(values) for name, values in found.items()}
 
