@@ -71,14 +71,19 @@ def one_way(
     """
     runs: list[dict[str, Any]] = []
     # The first run of a kind compiles
-    way(case, replace(size, realizations=2, seed=0))
-    realizations = plan["realizations"]
+    for seed in (0, 1):
+        found = way(case, replace(size, realizations=2, seed=seed))
+    # A slow program gets shorter runs and fewer of them
+    realizations, seeds = plan["realizations"], plan["seeds"]
+    affordable = 2.0 * plan["core_seconds"] / max(found.core_seconds, 1e-9)
+    while realizations * seeds > affordable and (realizations, seeds) != (4, 4):
+        realizations, seeds = max(realizations // 2, 4), max(seeds // 2, 4)
     while True:
         longer = replace(size, realizations=realizations)
-        runs.append(one_length(case, way, longer, truth, plan["seeds"]))
+        runs.append(one_length(case, way, longer, truth, seeds))
         last = runs[-1]
         enough = len(runs) > 1 and last["rms"] < plan["error"]
-        if enough or 4.0 * last["core_seconds"] * plan["seeds"] > plan["core_seconds"]:
+        if enough or 4.0 * last["core_seconds"] * seeds > plan["core_seconds"]:
             break
         realizations *= 4
     spreads = [run.pop("spread") for run in runs]

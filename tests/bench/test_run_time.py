@@ -72,6 +72,12 @@ def test_variance_slope_and_gain_are_those_put_in():
     assert gained["rms"] == pytest.approx(4.0, rel=0.1)
 
 
+def test_a_slow_program_gets_short_runs():
+    plan = {"realizations": 16, "seeds": 8, "error": 0.001, "core_seconds": 20.0}
+    found = one_way(None, invented(0.0, SPREAD, seconds=1.0), SMALL, TRUTH, plan)
+    assert [run["realizations"] for run in found["runs"]] == [4]
+
+
 @pytest.mark.parametrize("name", ["rough", "metal", "map"])
 def test_the_plain_program_finds_the_light_of_the_engine(name):
     # Two programs without common code but for the surface
