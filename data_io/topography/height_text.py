@@ -164,7 +164,7 @@ def _counts(rows: np.ndarray) -> bool:
     """Tell whether the first row rises or falls evenly, and no other does."""
     # The corner belongs to either
     steps = np.diff(rows[:, 1:], axis=1)
-    known: np.ndarray = np.isfinite(steps).all(axis=1)
+    known = np.logical_and.reduce(np.isfinite(steps), axis=1)
     steps = np.where(known[:, None], steps, 0.0)
     apart: np.ndarray = np.abs(steps - steps[:, :1]).max(axis=1)
     even = np.logical_and(known, apart <= 1e-6 * np.abs(steps).mean(axis=1))

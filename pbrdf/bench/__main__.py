@@ -24,7 +24,7 @@ FULL = {
 }  # fmt: skip
 QUICK = FULL | {"side": 128, "n_rays": 4000, "seeds": 4, "error": 0.01, "core_seconds": 8.0}
 LOOKS = {
-    "reduced": "C0o-", "plain": "C1s-", "observe": "C0o-", "NumPy + embreex": "C2^-",
+    "reduced": "C0o-", "plain": "C1s-", "NumPy + embreex": "C2^-",
     "Mitsuba 3": "C4v-",
 }  # fmt: skip
 

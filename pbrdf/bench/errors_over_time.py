@@ -21,9 +21,8 @@ def reference(case: Case, size: Size, error: float, core_seconds: float) -> dict
     Returns its value and error (wavelengths, bins) and the bins that count.
     """
     longer = replace(size, realizations=PILOT, seed=REFERENCE)
-    plainly = plain if case.readings is None else reduced
     for _ in range(2):
-        found = plainly(case, longer)
+        found = plain(case, longer)
         peak = found.value.max(axis=1, keepdims=True)
         bright = found.value > BRIGHT * peak
         reached = float(np.sqrt(np.mean((found.error[bright] / found.value[bright]) ** 2)))

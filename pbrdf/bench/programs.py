@@ -167,8 +167,6 @@ def _mean(
 def programs_for(case: Case) -> dict[str, Way]:
     """Find the ways that know a case, by name."""
     known: dict[str, Way] = {"reduced": reduced, "plain": plain}
-    if case.readings is not None:
-        known = {"observe": reduced}
     if case.index is not None:
         known["NumPy + embreex"] = numpy_and_embreex
         # The loop over Mitsuba knows glass alone
