@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from numpy.testing import assert_allclose
 
 from pbrdf import Drops, Film, GaussianSurface, Material, Scene, Spheres, simulate
 from pbrdf.simulation import simulate_parts
+from pbrdf.simulation.pilot import BODY_TIME, _times
 from tests.statistical.estimators import hold_together
 
 GLASS, WATER = Material(1.5), Material(1.333)
@@ -70,6 +72,29 @@ def test_there_is_less_noise_about_the_mirror_direction(wet):
     assert told == [False, True]
     # The rays are the same: what takes more than one bounce is the same to the bit
     assert (plain.brdf[1:] == reduced.brdf[1:]).all()
+
+
+@pytest.mark.filterwarnings("ignore::pbrdf.errors.AccuracyWarning")
+def test_each_wavelength_is_corrected_as_it_is_alone():
+    material = Material.from_table(wavelength=[0.4, 0.7], n=[1.4, 1.9], kappa=[0.0, 2.0])
+    scene, wavelength = Scene(SMOOTH, material, SPHERES), np.linspace(0.4, 0.7, 5)
+    options = {"n_rays": 1500, "realizations": 8, "seed": 4, **BINS}
+    together = simulate(scene, 0.7, wavelength=wavelength, **options)
+    assert together.attrs["variance_reduction"] == REDUCED
+    for k in (0, 4):
+        alone = simulate(scene, 0.7, wavelength=wavelength[k], **options)
+        for name in ("brdf", "brdf_stderr"):
+            # What is split at further bounces draws its own numbers
+            own, other = together[name].isel(wavelength=k)[0], alone[name][0]
+            assert_allclose(own, other, rtol=0, atol=1e-12 * float(np.abs(other).max()))
+
+
+def test_a_plan_knows_of_the_bodies_that_are_laid():
+    pilot = xr.Dataset(attrs={"contaminants": [str({"kind": "drops", "number": 3})]})
+    wet, ray = _times(Scene(SMOOTH, GLASS, DROPS), pilot)
+    dry, clean_ray = _times(Scene(SMOOTH, GLASS), xr.Dataset(attrs={"contaminants": []}))
+    assert wet - dry == 3 * BODY_TIME
+    assert ray > clean_ray
 
 
 @pytest.mark.slow

@@ -112,7 +112,7 @@ class BesideBodies:
     ) -> "BesideBodies":
         """Integrate over the slope law for every direction and wavelength of a plan."""
         fewer = max(plan.n_rays // FEWER_LOOKS, 1)
-        single = SingleBounce.of(surface, replace(plan, n_rays=fewer))
+        single = SingleBounce.of(surface, replace(plan, n_rays=fewer)).with_light(plan)
         unit = single.known()
         wanted = unit > DARKEST * unit.max(axis=(1, 2), keepdims=True)
         wanted &= unit * plan.n_rays * samples > FEWEST_RAYS
