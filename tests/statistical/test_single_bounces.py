@@ -70,6 +70,23 @@ def test_where_nothing_is_hidden_the_answer_is_an_integral():
     assert np.abs(z).max() < 5
 
 
+@pytest.mark.filterwarnings("ignore:The tangent plane errs")
+@pytest.mark.parametrize("phi_i", [0.3, "uniform"])
+def test_many_wavelengths_are_each_what_they_are_alone(phi_i):
+    """Summed by bin; the rays and looks are those of one wavelength."""
+    material = Material.from_table(wavelength=[0.4, 0.7], n=[1.4, 1.9], kappa=[0.0, 2.0])
+    scene, wavelength = Scene(SURFACE, material), np.linspace(0.4, 0.7, 5)
+    options = {"n_rays": 400, "realizations": 8, "seed": 3, "phi_i": phi_i, **BINS}
+    together = simulate(scene, 0.9, wavelength=wavelength, **options)
+    assert together.attrs["variance_reduction"] == "single bounces"
+    for k in (0, 3):
+        alone = simulate(scene, 0.9, wavelength=wavelength[k], **options)
+        own = together.isel(wavelength=k)
+        for name in ("brdf", "brdf_stderr", "brdf_total_stderr", "albedo", "absorbed"):
+            most = np.abs(alone[name].values).max()
+            assert_allclose(own[name], alone[name], rtol=0, atol=2e-8 * most)
+
+
 def test_a_target_error_alone_is_planned_for_and_met():
     scene = Scene(SURFACE, Material(1.5))
     heard = []
