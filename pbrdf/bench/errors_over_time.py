@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pbrdf.bench.programs import Size, Way, model_bias, plain, programs_for, reduced
+from pbrdf.bench.programs import Size, Way, model_light, plain, programs_for, reduced
 from pbrdf.bench.scenes import Case
 
 # Bins above this part of the peak count
@@ -125,7 +125,7 @@ def measure(case: Case, plan: dict[str, Any], workers: int | None) -> dict[str, 
 
 
 def _floor(case: Case, truth: dict[str, Any]) -> float | None:
-    value = model_bias(case)
+    value = model_light(case)
     if value is None:
         return None
     bright = truth["bright"]

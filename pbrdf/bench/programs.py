@@ -16,6 +16,9 @@ from pbrdf.bench.yardstick import simulate_plainly
 from pbrdf.conventions import detector_bins
 from pbrdf.errors import AccuracyWarning
 
+# Points a side of a bin for the mean of the model; odd, as bins are centred on azimuth 0
+FINER = 7
+
 
 @dataclass(frozen=True, kw_only=True)
 class Size:
@@ -175,10 +178,16 @@ def programs_for(case: Case) -> dict[str, Way]:
     return known
 
 
-def model_bias(case: Case) -> np.ndarray | None:
-    """M00 of the analytical model at the centres of the bins. [1/sr]"""
+def model_light(case: Case) -> np.ndarray | None:
+    """M00 of the analytical model, averaged over the bins. [1/sr]"""
     if case.model is None:
         return None
-    theta_s, dphi, _ = detector_bins(N_THETA, N_DPHI)
-    value = case.model.brdf(case.theta_i, theta_s[:, None], dphi)[..., 0, 0]
-    return np.asarray(value.reshape(1, -1))
+    theta_s, dphi, weight = detector_bins(FINER * N_THETA, FINER * N_DPHI)
+    light = weight * case.model.brdf(case.theta_i, theta_s[:, None], dphi)[..., 0, 0]
+    value, area = (
+        np.roll(one, FINER // 2, axis=1)
+        .reshape(N_THETA, FINER, N_DPHI, FINER)
+        .sum(axis=(1, 3))
+        for one in (light, weight)
+    )
+    return np.asarray((value / area).reshape(1, -1))

@@ -11,6 +11,7 @@ from pbrdf.bench.errors_over_time import gain, measure, one_length, one_way
 from pbrdf.bench.programs import (
     Found,
     Size,
+    model_light,
     numpy_and_embreex,
     plain,
     programs_for,
@@ -103,6 +104,15 @@ def test_a_case_is_measured_drawn_and_told(tmp_path):
     lines = "\n".join(line for result in results for line in table(result))
     for word in ("NumPy + embreex", "time to one error", "model", "stages", "goniometer"):
         assert word in lines
+
+
+def test_the_model_is_averaged_over_the_bins_of_the_run():
+    # A smooth surface hides nothing: its light is the model's
+    case = CASE["smooth"]
+    ours = reduced(case, replace(SMALL, side=128, n_rays=8000, realizations=64))
+    bright = ours.value > 0.1 * ours.value.max()
+    apart = np.abs(model_light(case)[bright] / ours.value[bright] - 1.0)
+    assert apart.max() < 0.005
 
 
 def test_every_class_of_scene_has_a_case():
