@@ -17,7 +17,7 @@ from pbrdf.conventions import detector_bins
 from pbrdf.errors import AccuracyWarning
 
 # Points a side of a bin for the mean of the model; odd, as bins are centred on azimuth 0
-FINER = 7
+FINER = 15
 
 
 @dataclass(frozen=True, kw_only=True)

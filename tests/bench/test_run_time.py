@@ -107,7 +107,8 @@ def test_a_case_is_measured_drawn_and_told(tmp_path):
 
 
 def test_the_model_is_averaged_over_the_bins_of_the_run():
-    # A smooth surface hides nothing: its light is the model's
+    # A smooth surface hides nothing: its light is the model's, but for the diagonals of 16
+    # cells a length, which tell +dphi from -dphi by 1/(2 16^2)
     case = CASE["smooth"]
     ours = reduced(case, replace(SMALL, side=128, n_rays=8000, realizations=64))
     bright = ours.value > 0.1 * ours.value.max()
