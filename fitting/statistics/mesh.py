@@ -7,6 +7,7 @@ import numpy as np
 
 from fitting.estimate import Estimate
 from pbrdf import MeshSurface
+from pbrdf.surface.mesh.probes import exposed_shares
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,13 +25,13 @@ class MeshStatistics:
     """Statistics of the facets of a mesh, each with a 95 % interval.
 
     Errors are the scatter between 16 parts of the mesh: they tell how well the mesh
-    stands for more of the same surface. Faces inside of other bodies, where bodies cut into
-    each other, count like all others.
+    stands for more of the same surface. Where bodies intersect, what of a face lies inside
+    another body does not count; 100 000 points tell how much that is.
 
     Attributes
     ----------
     area_ratio : Estimate
-        Area of all facets over the area of the period, or of the rectangle around. [1]
+        Area of the surface over the area of the period, or of the rectangle around. [1]
     overhang_share : Estimate
         Share of the area that looks down. [1]
     wall_share : Estimate
@@ -112,6 +113,10 @@ def mesh_statistics(mesh: MeshSurface) -> MeshStatistics:
         The mesh.
     """
     normals, areas = mesh.normals, mesh.areas
+    if mesh.intersecting:
+        areas = areas * exposed_shares(
+            mesh.vertices, mesh.faces, normals, areas, mesh.period
+        )
     up = normals[:, 2]
     tilt = np.arccos(np.clip(up, -1.0, 1.0))
     gentle = tilt < WALL

@@ -10,6 +10,11 @@ from pbrdf.derived.elements import mueller
 __all__ = ["beside", "bin_averages", "on_bins"]
 
 _BINS = ("theta_s", "dphi", "stokes_out", "stokes_in")
+# Values in a cell may differ by so much before it is cut in four, if they count for more
+# than this share of all light
+_STEEP, _COUNTS = 8.0, 1e-5
+# Cuts of any cell at most, and at least at the specular direction, where lobes are narrow
+_MOST_CUTS, _CUTS_AT_MIRROR = 10, 4
 
 
 def bin_averages(
@@ -35,7 +40,8 @@ def bin_averages(
     wavelength : float, optional
         In vacuum. [um]
     order : int
-        Nodes of the Gauss-Legendre rule along each side of a bin.
+        Nodes of the Gauss-Legendre rule along each side of a bin. Where the model varies
+        much within a bin, it is cut in four, and these again.
 
     Returns
     -------
@@ -50,16 +56,53 @@ def bin_averages(
     >>> np.unique(bin_averages(white, 0.4, 3, 4)[..., 0, 0].round(12))
     array([1.])
     """
-    node, weight = np.polynomial.legendre.leggauss(order)
-    step_t, step_p = np.pi / 2 / n_theta, 2 * np.pi / n_dphi
-    theta = (np.arange(n_theta)[:, None] + 0.5 + 0.5 * node) * step_t
-    dphi = (np.arange(n_dphi)[:, None] + 0.5 * node) * step_p
-    angles = (theta_i, theta[:, None, :, None], dphi[None, :, None, :])
+    step = np.array([np.pi / 2 / n_theta, 2 * np.pi / n_dphi])
+    i, j = (k.ravel() for k in np.indices((n_theta, n_dphi)))
+    corner = np.stack([i, j - 0.5], axis=1) * step
+    owner = np.arange(len(corner))
     turned = {} if phi_i == 0.0 else {"phi_i": phi_i}
-    value = model.brdf(*angles, wavelength, **turned)
-    measure = (np.sin(theta) * np.cos(theta) * weight)[:, None, :, None] * weight
-    total = np.einsum("tojk,tpjkmn->tpmn", measure, value)
-    return total / measure.sum((2, 3))[..., None, None]
+    total, area = np.zeros((len(corner), 4, 4)), np.zeros(len(corner))
+    for cuts in range(_MOST_CUTS + 1):
+        value, measure = _cells(model, theta_i, corner, step, order, wavelength, turned)
+        whole = np.einsum("cop,copmn->cmn", measure, value)
+        if cuts == 0:
+            light = np.abs(whole[:, 0, 0]).sum()
+        size = measure.sum((1, 2))
+        low, high = (f(np.abs(value[..., 0, 0]), axis=(1, 2)) for f in (np.min, np.max))
+        steep = (high > _STEEP * low) & (high * size > _COUNTS * light)
+        if cuts < _CUTS_AT_MIRROR:
+            away = np.abs(corner + 0.5 * step - [theta_i, np.pi])
+            steep |= (away <= 0.51 * step).all(axis=1)
+        if cuts == _MOST_CUTS:
+            steep[:] = False
+        np.add.at(total, owner[~steep], whole[~steep])
+        np.add.at(area, owner[~steep], size[~steep])
+        if not steep.any():
+            break
+        step = 0.5 * step
+        quarters = np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) * step
+        corner = (corner[steep][:, None] + quarters).reshape(-1, 2)
+        owner = np.repeat(owner[steep], 4)
+    means: np.ndarray = total / area[:, None, None]
+    return means.reshape(n_theta, n_dphi, 4, 4)
+
+
+def _cells(
+    model: Any,
+    theta_i: float,
+    corner: np.ndarray,
+    step: np.ndarray,
+    order: int,
+    wavelength: float | None,
+    turned: dict[str, float],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values (cells, order, order, 4, 4) at the nodes of cells, and cos(theta) dOmega."""
+    node, weight = np.polynomial.legendre.leggauss(order)
+    theta = corner[:, :1] + 0.5 * (1.0 + node) * step[0]
+    dphi = corner[:, 1:] + 0.5 * (1.0 + node) * step[1]
+    value = model.brdf(theta_i, theta[:, :, None], dphi[:, None, :], wavelength, **turned)
+    along = np.sin(theta) * np.cos(theta) * weight
+    return value, along[:, :, None] * weight * step.prod() / 4
 
 
 def on_bins(model: Any, like: xr.DataArray) -> xr.Dataset:

@@ -1,21 +1,19 @@
 """Parts of a mesh that cut through themselves or through their images over a period."""
 
-from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from pbrdf.surface.mesh.mending import Mended, named
+from pbrdf.surface.mesh.probes import TOUCH, met_between, moves_of, scene_of
 from pbrdf.surface.mesh.topology import Edges, face_vectors, winding_numbers
 
 __all__ = ["Crossings", "check_crossings", "find_crossings", "inside_out"]
 
-# Rays start and end this share of an edge from its ends, and behind what they have met
-STEP = 1e-4
-# Edges in one call of Embree, and facets that an edge may meet
-CHUNK, MOST_MET = 2**18, 64
-# Distances below this share of the extent are contact
-TOUCH = 1e-9
+# Edges in one call of Embree
+CHUNK = 2**18
+# What passes through an edge nearer to its ends, as a share of it, is not looked for
+MARGIN = 1e-4
 # Places at which sides are looked at; steps beside them, as shares of an edge
 MOST_PLACES, BESIDE, OFF = 16, 1e-4, 1e-7
 # Facets of a smaller angle give no line of intersection
@@ -143,11 +141,11 @@ def find_crossings(
     ends, owner = edges.ends[first], edges.face[first]
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     extent = float((high - low).max())
-    scene = _scene((vertices - low) / extent, faces)
+    scene = scene_of((vertices - low) / extent, faces)
     lowest = np.minimum(vertices[ends[:, 0]], vertices[ends[:, 1]])[:, :2]
     highest = np.maximum(vertices[ends[:, 0]], vertices[ends[:, 1]])[:, :2]
     met = []
-    for move in _moves(low, high, period):
+    for move in moves_of(low, high, period):
         image = bool(np.any(move))
         near = np.arange(len(ends))
         if image:
@@ -157,7 +155,7 @@ def find_crossings(
         for chunk in np.split(near, np.arange(CHUNK, len(near), CHUNK)):
             segments = vertices[ends[chunk]] + move
             rays = ((segments - low) / extent).astype(np.float32)
-            for number, hit in _met(scene, rays):
+            for number, hit in met_between(scene, rays, MARGIN):
                 edge = chunk[number]
                 own = part[owner[edge]] == part[hit]
                 if not image:
@@ -172,50 +170,6 @@ def find_crossings(
                     )
                 )  # fmt: skip
     return Crossings(*(np.concatenate(one) for one in zip(*met, strict=True)))
-
-
-def _scene(vertices: np.ndarray, faces: np.ndarray) -> Any:
-    from embreex.mesh_construction import TriangleMesh
-    from embreex.rtcore_scene import EmbreeScene
-
-    scene = EmbreeScene(robust=True)
-    TriangleMesh(scene, vertices.astype(np.float32), faces.astype(np.int32))
-    return scene
-
-
-def _moves(
-    low: np.ndarray, high: np.ndarray, period: tuple[float, float] | None
-) -> list[np.ndarray]:
-    """Shifts of the images that reach into the mesh, the mesh itself first."""
-    moves = [np.zeros(3)]
-    if period is not None:
-        widths = (high - low)[:2]
-        # Those that only touch it do not count
-        reach = np.ceil(widths / period - TOUCH).astype(int) - 1
-        for i, j in product(*(range(-n, n + 1) for n in reach)):
-            if (i, j) != (0, 0):
-                moves.append(np.array([i * period[0], j * period[1], 0.0]))
-    return moves
-
-
-def _met(scene: Any, rays: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Rays (rays, 2 ends, 3) and the faces that they meet between their ends, in turn."""
-    start, way = rays[:, 0], rays[:, 1] - rays[:, 0]
-    number = np.arange(len(rays))
-    gone = np.full(len(rays), STEP, dtype=np.float32)
-    found = []
-    for _ in range(MOST_MET):
-        if len(number) == 0:
-            break
-        origins = start[number] + gone[:, None] * way[number]
-        left = np.maximum(np.float32(1.0 - STEP) - gone, 0.0).astype(np.float32)
-        told = scene.run(origins, way[number], dists=left.copy(), output=True)
-        face = told["primID"]
-        hit = (face >= 0) & (told["tfar"] < left)
-        number, face = number[hit], face[hit]
-        found.append((number, face))
-        gone = (gone + told["tfar"] + np.float32(STEP))[hit]
-    return found
 
 
 def _through(
