@@ -268,7 +268,10 @@ def _fit_sides(
         baseline=contacts + origin,
         lean=float(np.rad2deg(drop.lean)),
         base_width=float(right - left),
-        height=float(drop.points[:, 1].max()),
+        # A needle hides the top
+        height=float(
+            whole.parameters[1] if models == ("laplace",) * 2 else clear[:, 1].max()
+        ),
         bond_number=whole.bond_number if "arc" not in models else float("nan"),
         model=(models[0], models[1]),
         rms=(results[0][0].rms, results[1][0].rms),

@@ -89,13 +89,17 @@ def _lines(found: "ContactAngle") -> str:
     rows = [f"{name:6}{estimate} degrees" for name, estimate in sides]
     (top, left), (bottom, right) = found.baseline
     beyond = max(side.high - side.value - 1.96 * side.stderr for _, side in sides)
+    allowed = (
+        f"Upper ends allow for {beyond:.1f} degrees by it (0 with --baseline)."
+        if beyond >= 0.05
+        else "Here the contact is seen, or given, and the intervals leave it out."
+    )
     return "\n".join(
         [
             *rows,
             f"base  {found.base_width:.1f} pixels wide, drop {found.height:.1f} high; from "
             f"row {top:.1f}, column {left:.1f} to row {bottom:.1f}, column {right:.1f}",
             "A foot hidden by the substrate's front edge is not seen in a silhouette: each "
-            f"pixel of it adds {max(found.per_pixel, key=abs):+.2f} degrees. "
-            f"Upper ends allow for {max(beyond, 0):.1f} degrees by it (0 with --baseline).",
+            f"pixel of it adds {max(found.per_pixel, key=abs):+.2f} degrees. {allowed}",
         ]
     )
