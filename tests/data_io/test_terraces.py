@@ -7,6 +7,7 @@ from scipy import ndimage
 
 from data_io import MendWarning, deterrace, find_bands, mend_map
 from pbrdf import GaussianSurface, HeightMap
+from studies.terraces.run import KINDS, digitise, draw_case
 
 SHARES = np.arange(0.10, 0.951, 0.05)
 
@@ -190,3 +191,15 @@ def test_uneven_bands_of_a_colour_bar():
     found = deterrace(HeightMap(raw, 1.0))
     assert found.bands.levels.size == edges.size - 1
     assert_allclose(slope_rms(found.surface.heights), slope_rms(true), rtol=0.03)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_surfaces_of_the_study(kind):
+    """Drawn over the range of the study: slopes 0.15 to 0.6, 8 to 64 bands."""
+    for seed in range(3):
+        true, raw = digitise(draw_case(kind, seed), 256)
+        mended = deterrace(HeightMap(raw, 1.0)).surface.heights
+        assert_allclose(slope_rms(mended), slope_rms(true), rtol=0.03)
+        wanted = np.quantile(np.abs(slopes(true)), SHARES)
+        assert_allclose(np.quantile(np.abs(slopes(mended)), SHARES), wanted, rtol=0.08)
