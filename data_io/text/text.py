@@ -15,6 +15,8 @@ from pbrdf.errors import DataFileError
 COMMENT_MARKS = ("#", "%")
 # Lines of words before the numbers, of which there may be a million
 MOST_HEADER = 100_000
+# Signs of the name of a column
+LONGEST_NAME = 500
 
 
 class Line(NamedTuple):
@@ -126,13 +128,13 @@ def _blocks(texts: list[str]) -> list[list[int]]:
     blocks: list[list[int]] = []
     inside = False
     for i, text in enumerate(texts, start=1):
+        if i > MOST_HEADER and not blocks:
+            break
         stripped = text.lstrip()
         if not stripped or stripped.startswith(COMMENT_MARKS):
             continue
         if not inside:
             if not _is_data(text):
-                if i > MOST_HEADER and not blocks:
-                    break
                 continue
             blocks.append([])
             inside = True

@@ -7,7 +7,7 @@ import re
 from bisect import bisect_left
 from dataclasses import dataclass
 
-from data_io.text.text import COMMENT_MARKS, Line, Rows, find_delimiter
+from data_io.text.text import COMMENT_MARKS, LONGEST_NAME, Line, Rows, find_delimiter
 from data_io.text.units import unit_kind
 from pbrdf.files.reading import MOST_CELLS
 
@@ -74,6 +74,8 @@ def describe(place: int, name: str) -> Column:
     >>> describe(0, "x_mm").role, describe(0, "x_mm").unit, describe(0, "No.").role
     ('x', 'mm', 'index')
     """
+    if len(name) > LONGEST_NAME:
+        return Column(place, name.strip(), "", None)
     words, unit = _unit(name.strip())
     return Column(place, name.strip(), _role(words, unit), unit)
 

@@ -123,6 +123,7 @@ KINDS = {
     "npz of zeros": (".npz", MESH, lambda: npz(2**22, 3 * 8 * 2**22)),
     "aliases": (".yml", CONSTANTS, laughs("a{0}: &a{0} [{1}]\n")),
     "merged aliases": (".yml", CONSTANTS, laughs("a{0}: &a{0} {{{{<<: [{1}]}}}}\n")),
+    "no date": (".yml", CONSTANTS, b"REFERENCES: x\nDATA:\n  - type: !!timestamp x\n"),
     "deep": (".yml", CONSTANTS, b"DATA:\n  - type: " + b"[" * 100_000),
     "deep keys": (".yml", CONSTANTS, b"? " * 20_000 + b"a"),
     "many parts": (".yml", CONSTANTS, b"DATA:\n" + b"  - {type: a}\n" * 400_000),

@@ -95,6 +95,21 @@ def test_readings_brighter_than_any_surface_are_refused(tmp_path):
     assert read_goniometer(path, quantity="relative").M00[0] == 1e12
 
 
+@pytest.mark.parametrize("read", [read_goniometer, read_profile, read_height_map])
+@pytest.mark.parametrize(
+    "text",
+    ["1" + 200_000 * " " + "x\n", 50_000 * "a[" + ",1\n2,3\n", 600_000 * "#\n"],
+    ids=["spaces", "brackets", "remarks"],
+)
+def test_names_and_headers_without_an_end_are_refused_soon(tmp_path, read, text):
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    begin = time.process_time()
+    with pytest.raises(DataFileError, match=r"a\.csv"):
+        read(path)
+    assert time.process_time() - begin < 5.0
+
+
 @pytest.mark.parametrize("scale", ["0", "-1.0", "nan", "1e999"])
 def test_scales_of_a_profile_are_numbers_above_zero(tmp_path, scale):
     path = tmp_path / "a.prf"

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from data_io.goniometer.scan import QUANTITIES, STDERR
 from data_io.goniometer.tables.units import ANGLE_UNITS, split_bracket, unit_named
+from data_io.text.text import LONGEST_NAME
 from pbrdf.optics.published.columns import column_of, unit_of
 
 __all__ = [
@@ -104,6 +105,8 @@ def meaning_of(name: str) -> Meaning | None:
     >>> meaning_of("M10/M00").name, meaning_of("m10_stderr").stderr
     ('m10', True)
     """
+    if len(name) > LONGEST_NAME:
+        return None
     plain, bracket = _split(name)
     if _AT_WAVELENGTH.fullmatch(bracket):
         # BRDF (450 nm)

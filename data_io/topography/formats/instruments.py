@@ -4,6 +4,7 @@ It reads about forty formats (SUR, OPD, PLUX, AL3D, VK, Gwyddion, AFM and others
 optional dependency, the extra ``pbrdf[formats]``.
 """
 
+import re
 import struct
 import warnings
 from collections.abc import Iterator
@@ -42,6 +43,7 @@ INSTRUMENT_SUFFIXES = {
 
 # Of tables that the package is given
 _LONGEST_LINE, _MOST_ROWS = 100_000, 20_000
+_NUMBERS = re.compile(rb"^[ \t]*[-+.]?\d", re.MULTILINE)
 _NO_HEIGHT = 1e30
 _NANO_PER_MILLI = 1e-6
 _PARK_TAG = 50432
@@ -207,6 +209,7 @@ def _open_detected(path: Path) -> Any:
     start, lines = content[:512], content.split(b"\n")
     text = b"\0" not in content and path.suffix.lower() not in INSTRUMENT_SUFFIXES
     text = text and max(map(len, lines)) < _LONGEST_LINE
+    text = text and _NUMBERS.search(content) is not None
     # Of a matrix each line is a row
     tables = {"xyz": text, "asc": text and len(lines) < _MOST_ROWS}
     for reader in readers:

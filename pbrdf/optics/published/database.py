@@ -64,7 +64,8 @@ def _parse(path: Path, text: str) -> dict[str, Any]:
         entry = yaml.load(text, Loader=loader)
     except DataFileError:
         raise
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
+    except (yaml.YAMLError, RecursionError, ValueError, AttributeError) as error:
+        # Its tags fail so of texts that are no dates
         problem = f"is not valid YAML: {' '.join(str(error).split())[:120]}"
         raise DataFileError(path, problem, "Download the entry again.") from error
     if not isinstance(entry, dict):
