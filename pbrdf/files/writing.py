@@ -63,9 +63,12 @@ def complete_file(path: str | Path, *, replace: bool = True) -> Iterator[Path]:
         raise ExistsError(path)
     _clear_leftovers(path.parent)
     # The suffix stays: writers choose their format by it
-    handle, name = tempfile.mkstemp(
-        prefix=_prefix(path), suffix=path.suffix, dir=path.parent
-    )
+    try:
+        handle, name = tempfile.mkstemp(
+            prefix=_prefix(path), suffix=path.suffix, dir=path.parent
+        )
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
     os.close(handle)
     stage = Path(name)
     try:
@@ -96,7 +99,10 @@ def complete_folder(target: Path, *, replace: bool = False) -> Iterator[Path]:
     _clear_leftovers(target.parent)
     if not replace and target.exists() and not _empty_folder(target):
         raise ExistsError(target)
-    stage = Path(tempfile.mkdtemp(prefix=_prefix(target), dir=target.parent))
+    try:
+        stage = Path(tempfile.mkdtemp(prefix=_prefix(target), dir=target.parent))
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(target)) from error
     try:
         yield stage
         stage.chmod(0o777 & ~_umask())

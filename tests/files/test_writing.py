@@ -254,3 +254,18 @@ def test_files_have_the_rights_of_any_new_file(tmp_path):
     (tmp_path / "b").write_text("b")
     modes = {(tmp_path / name).stat().st_mode for name in "ab"}
     assert len(modes) == 1
+
+
+@pytest.mark.parametrize(
+    ("make", "complete"), [("mkstemp", complete_file), ("mkdtemp", complete_folder)]
+)
+def test_a_refusal_names_the_output_and_not_its_stage(
+    tmp_path, monkeypatch, make, complete
+):
+    def refuse(**_):
+        raise PermissionError(13, "Permission denied", "/x/.out.part-a-1-b")
+
+    monkeypatch.setattr(f"tempfile.{make}", refuse)
+    with pytest.raises(PermissionError) as caught, complete(tmp_path / "out.nc"):
+        pass
+    assert caught.value.filename == str(tmp_path / "out.nc")
