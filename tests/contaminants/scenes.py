@@ -12,41 +12,45 @@ LIMIT = 5.26
 
 
 def whole(result):
-    """Mueller matrix of all light that comes back."""
+    """Mueller matrix of all light that comes back, of the first incidence."""
+    return by_incidence(result)[0]
+
+
+def by_incidence(result):
+    """Mueller matrices of all light that comes back, one of each incidence."""
     flux = result.brdf_total * result.projected_solid_angle
-    return flux.isel(theta_i=0).sum(("theta_s", "dphi")).values
+    return flux.sum(("theta_s", "dphi")).values
 
 
 @cache
-def _runs(scene, angles, seeds, options):
-    """Run a scene under several seeds, all incidences at once."""
-    return [simulate(scene, angles, seed=k, **dict(options)) for k in range(seeds)]
+def _runs(described, size, angles, copies, options):
+    """Run a scene once, with so many independent copies of each incidence."""
+    scene = Scene(HeightMap.flat(size=size), *_DESCRIBED[described])
+    return simulate(scene, np.repeat(angles, copies), **dict(options))
 
 
-@cache
-def _flat(described, size):
-    """Return one scene of those that read alike, which `_runs` then knows again."""
-    return Scene(HeightMap.flat(size=size), *_DESCRIBED[described])
-
-
+# Scenes that read alike share their runs
 _DESCRIBED = {}
 
 
 def flat_runs(
-    substrate, contaminants, theta, *, among=None, seeds=24, size=(1.0, 1.0), **options
+    substrate, contaminants, theta, *, among=None, copies=24, size=(1.0, 1.0), **options
 ):
-    """Mean of the whole Mueller matrix over seeds, its standard error, and one result.
+    """Mean of the whole Mueller matrix over runs, its standard error, and the runs.
 
-    Tests that differ in theta only share their runs if they name all angles `among`.
+    Each copy of an incidence has rays of its own: 24 copies are 24 runs, for the price of
+    one call. Tests that differ in theta only share their runs if they name all angles
+    `among`.
     """
     angles = (theta,) if among is None else tuple(among)
     described = f"{substrate!r} {contaminants!r}"
     _DESCRIBED.setdefault(described, (substrate, contaminants))
-    results = _runs(_flat(described, size), angles, seeds, tuple(options.items()))
-    results = [one.isel(theta_i=[angles.index(theta)]) for one in results]
-    matrices = np.array([whole(one) for one in results])
-    stderr = matrices.std(axis=0, ddof=1) / np.sqrt(seeds)
-    return matrices.mean(axis=0), stderr, results[0]
+    result = _runs(described, size, angles, copies, tuple(options.items()))
+    first = angles.index(theta) * copies
+    result = result.isel(theta_i=slice(first, first + copies))
+    matrices = by_incidence(result)
+    stderr = matrices.std(axis=0, ddof=1) / np.sqrt(copies)
+    return matrices.mean(axis=0), stderr, result
 
 
 def assert_within(value, stderr, expected, limit=LIMIT, floor=1e-12, extra=0.0):
