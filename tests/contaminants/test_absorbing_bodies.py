@@ -39,7 +39,7 @@ def test_absorbing_sphere_by_order(kappa, depth):
     index = 1.45 + 1j * kappa
     sphere = Spheres.at([[0.5, 0.5, RADIUS]], radius=RADIUS, material=Material(1.45, kappa))
     scene = Scene(PLANE, Material.black(), sphere)
-    options = {"wavelength": wavelength, "n_rays": 100_000, "n_theta": 9, "n_dphi": 2}
+    options = {"wavelength": wavelength, "n_rays": 40_000, "n_theta": 9, "n_dphi": 2}
     result = simulate(scene, 0.0, **options)
     lit = math.pi * RADIUS**2 / 0.75**2
     upwards, cut = orders_of_a_sphere(index, RADIUS, wavelength)

@@ -71,7 +71,7 @@ def test_film_on_a_lambertian_base(n_film, n_base, theta):
     ):
         film = Film(thickness=thickness, material=Material(n_film, kappa))
         mean, stderr, _ = run(
-            Material(n_base, diffuse_albedo=0.7), film, theta, n_rays=20_000
+            Material(n_base, diffuse_albedo=0.7), film, theta, n_rays=8000
         )
         expected = slab_on_lambertian(
             theta, n_film + 1j * kappa, n_base, 0.7, thickness, 0.53

@@ -111,26 +111,27 @@ def test_errors_of_the_runs_cover_the_truth():
     assert flat.albedo_stderr[1, 0] > 0
 
 
-def test_the_command_writes_its_folder(tmp_path, capsys):
+# Pictures are what takes long
+@pytest.mark.parametrize("angles", ["30", pytest.param("30,50", marks=pytest.mark.slow)])
+def test_the_command_writes_its_folder(tmp_path, capsys, angles):
     from pbrdf import Scene
 
     Scene(SURFACE, PAINT).to_toml(tmp_path / "scene.toml")
     target = tmp_path / "dew"
     code = main(
         ["dew", "--scene", str(tmp_path / "scene.toml"), "--contact-angles-deg", "90",
-         "--theta-i-deg", "30,50", "--n-rays", "1000", "--runs", "4",
+         "--theta-i-deg", angles, "--n-rays", "1000", "--runs", "4",
          "--volume-per-area-um", "1", "--number-density-per-mm2", "400",
          "-o", str(target)]
     )  # fmt: skip
     assert code == 0
     names = {path.name for path in target.iterdir()}
-    assert names == {
-        "dew.nc", "dew.csv", "polarised.png", "model.toml",
-        "hemisphere_30deg.png", "hemisphere_50deg.png",
-    }  # fmt: skip
+    assert names == {"dew.nc", "dew.csv", "polarised.png", "model.toml"} | {
+        f"hemisphere_{angle}deg.png" for angle in angles.split(",")
+    }
     with (target / "dew.csv").open() as file:
         table = list(csv.DictReader(file))
-    assert len(table) == 2 * 2 * 4
+    assert len(table) == 2 * len(angles.split(",")) * 4
     assert {row["state"] for row in table} == {"dry", "90 deg"}
     assert float(table[0]["M00"]) > 10 * float(table[0]["M00_stderr"]) > 0
     assert "hemisphere" in capsys.readouterr().out
@@ -138,9 +139,10 @@ def test_the_command_writes_its_folder(tmp_path, capsys):
 
 def test_a_warning_that_differs_in_its_numbers_is_told_once():
     """Each contact angle has drops of a radius of its own, all too small for 10 um."""
+    small = GaussianSurface(shape=(32, 32), spacing=2.0, corr_length=15.0, slope_rms=0.05)
     with pytest.warns(AccuracyWarning) as caught:
         result = compare_dew(
-            SURFACE, "pvc", np.deg2rad([30.0, 60.0, 90.0]), 0.3,
+            small, "pvc", np.deg2rad([30.0, 60.0, 90.0]), 0.3,
             amount={"volume_per_area": 0.01, "number_density": 0.04}, runs=2, n_rays=320,
             n_theta=6, n_dphi=8, wavelength=10.0,
         )  # fmt: skip

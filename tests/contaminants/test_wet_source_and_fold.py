@@ -1,6 +1,7 @@
 """Sources of some width and folding by symmetry, where water lies on the surface."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -29,6 +30,13 @@ DEW = {"contact_angle": 1.2, "coverage": 0.25, "number_density": 4e-3, "material
 pytestmark = pytest.mark.filterwarnings("ignore::pbrdf.errors.AccuracyWarning")
 
 
+@cache
+def film_table():
+    """Matrices of the film at 2001 cosines from 0.6 to 1."""
+    cosines = np.linspace(0.6, 1.0, 2001)
+    return np.array([film_matrix(np.arccos(c), WATER.n, ALUMINIUM) for c in cosines])
+
+
 @pytest.mark.parametrize("level", [False, True])
 @pytest.mark.parametrize(("theta", "phi"), [(SOURCE, 0.7), (0.02, -2.0)])
 def test_a_flat_film_on_metal_mirrors_the_disc_with_its_frames(theta, phi, level):
@@ -39,11 +47,9 @@ def test_a_flat_film_on_metal_mirrors_the_disc_with_its_frames(theta, phi, level
         Scene(HeightMap.flat(size=(2.0, 3.0)), Material(*ALUMINIUM), film), theta,
         phi_i=phi, n_rays=120_000, source_half_angle=half, n_theta=n_theta, n_dphi=n_dphi,
     )  # fmt: skip
-    cosines = np.linspace(0.6, 1.0, 2001)
-    table = [film_matrix(np.arccos(c), WATER.n, ALUMINIUM) for c in cosines]
 
     def matrices(cosine):
-        return np.asarray(table)[np.rint((cosine - 0.6) / 0.4 * 2000).astype(int)]
+        return film_table()[np.rint((cosine - 0.6) / 0.4 * 2000).astype(int)]
 
     expected, drawn = mirrored_disc(theta, phi, half, matrices, n_theta, n_dphi)
     assert np.abs(expected[..., 2:, :2]).max() > 1e-4
@@ -52,14 +58,14 @@ def test_a_flat_film_on_metal_mirrors_the_disc_with_its_frames(theta, phi, level
 
 
 def test_a_wet_rough_surface_answers_a_disc_as_the_mean_of_its_directions():
-    """Light by zenith of the detector: wide source against 64 narrow ones."""
+    """Light by zenith of the detector: wide source against 36 narrow ones."""
     options = {"n_theta": 9, "n_dphi": 2, "stokes": "unpolarized", "seed": 4}
     smooth = replace(ROUGH, slope_rms=0.15).sample(2)
     scene = Scene(smooth, Material(*ALUMINIUM), Drops(**DEW, seed=3))
     wide = simulate(
-        scene, SOURCE, phi_i=0.5, n_rays=100_000, source_half_angle=0.4, **options
+        scene, SOURCE, phi_i=0.5, n_rays=50_000, source_half_angle=0.4, **options
     )
-    to_source, _ = disc(SOURCE, 0.5, 0.4, 64)
+    to_source, _ = disc(SOURCE, 0.5, 0.4, 36)
     narrow = [
         simulate(
             scene, np.arccos(one[2]), phi_i=np.arctan2(one[1], one[0]), n_rays=1600,
@@ -77,22 +83,22 @@ def test_a_wet_rough_surface_answers_a_disc_as_the_mean_of_its_directions():
     error = singles.std(axis=0, ddof=1) / np.sqrt(len(singles))
     assert np.abs((light(wide) - singles.mean(axis=0)) / error).max() < 5.0
     # And the width is seen: the axis alone is not the mean
-    axis = simulate(scene, SOURCE, phi_i=0.5, n_rays=100_000, **options)
+    axis = simulate(scene, SOURCE, phi_i=0.5, n_rays=50_000, **options)
     assert (np.abs(light(wide) - light(axis)) / error).max() > 5.0
 
 
-def folded(seed, fold, contaminants=(), surface=ROUGH):
+def folded(seed, fold, contaminants=(), surface=ROUGH, realizations=16):
     contaminants = contaminants or [Drops(**DEW), Film(thickness=0.2, material=WATER)]
     return simulate(
         Scene(surface, PAINT, contaminants), 0.9, phi_i="uniform", seed=seed, fold=fold,
-        n_rays=2000, realizations=16, n_theta=6, n_dphi=12,
+        n_rays=2000, realizations=realizations, n_theta=6, n_dphi=12,
     )  # fmt: skip
 
 
 @pytest.mark.parametrize("flat", [False, True])
 def test_folding_averages_each_bin_with_its_mirror_image(flat):
     surface = HeightMap.flat(size=(96.0, 80.0)) if flat else ROUGH
-    plain, fold = (folded(3, one, surface=surface) for one in (False, True))
+    plain, fold = (folded(3, one, surface=surface, realizations=4) for one in (False, True))
     assert_folded(fold, plain)
 
 
