@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,7 @@ def slope_rms(x: np.ndarray, z: np.ndarray) -> float:
     return float(np.std(CubicSpline(x, z)(x, 1)))
 
 
+@cache
 def draw(camera: Camera = CAMERA, corr_pixels: float = 20.0, n_corr: float = 40.0):
     """Return a picture and the true edge in it, its mean line removed."""
     rng = np.random.default_rng(RNG_SEED)
@@ -123,12 +125,18 @@ def test_blur_and_noise_are_measured(tmp_path):
     assert 0.75 * 0.435 < profile.threshold < 0.435
 
 
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """What is read of the edge as it is drawn."""
+    path = tmp_path_factory.mktemp("plain") / "plain.png"
+    return read_profile_image(save(path, draw()[0]), PIXEL)
+
+
 @pytest.mark.parametrize(
     "form", ["dark field", "upright", "colour", "16 bit", "one channel"]
 )
-def test_kinds_of_pictures_give_the_same_profile(tmp_path, form):
+def test_kinds_of_pictures_give_the_same_profile(tmp_path, plain, form):
     picture, _ = draw()
-    expected = read_profile_image(save(tmp_path / "plain.png", picture), PIXEL)
     level = np.full_like(picture, 120)
     other = {
         "dark field": 255 - picture,
@@ -138,12 +146,12 @@ def test_kinds_of_pictures_give_the_same_profile(tmp_path, form):
         "one channel": np.stack([level, level, picture], axis=-1),
     }[form]
     profile = read_profile_image(save(tmp_path / "other.png", other), PIXEL)
-    assert_allclose(profile.z, expected.z, atol=0.02)
+    assert_allclose(profile.z, plain.z, atol=0.02)
     if form == "one channel":
         assert profile.channel in ("grey", "blue")
 
 
-def test_z_points_out_of_the_material(tmp_path):
+def test_z_points_out_of_the_material(tmp_path, plain):
     """The truth has sharp peaks, skewness > 0; from the other side they are valleys."""
     picture, truth = draw()
     path = save(tmp_path / "edge.png", picture)
@@ -153,18 +161,17 @@ def test_z_points_out_of_the_material(tmp_path):
 
     expected = skewness(truth.z)
     assert expected > 0.3
-    assert skewness(read_profile_image(path, PIXEL).z) == pytest.approx(expected, abs=0.05)
+    assert skewness(plain.z) == pytest.approx(expected, abs=0.05)
     inverted = read_profile_image(path, PIXEL, material="bright")
     assert skewness(inverted.z) == pytest.approx(-expected, abs=0.05)
 
 
-def test_dust_is_dropped(tmp_path):
-    clean = read_profile_image(save(tmp_path / "clean.png", draw()[0]), PIXEL)
+def test_dust_is_dropped(tmp_path, plain):
     picture, truth = draw(replace(CAMERA, dust=150.0))
     dusty = read_profile_image(save(tmp_path / "dusty.png", picture), PIXEL)
     ratio = slope_rms(dusty.x, dusty.z) / slope_rms(truth.x, truth.z)
     assert ratio == pytest.approx(1, abs=0.05)
-    assert clean.warnings == ()
+    assert plain.warnings == ()
 
 
 def test_several_edges_are_separated(tmp_path):
@@ -241,7 +248,8 @@ def test_overlay_is_drawn_on_the_edge(tmp_path):
 @pytest.mark.parametrize(
     "name",
     ["camera", "astronaut", "brick", "grass", "gravel", "coins", "page", "moon", "text",
-     "retina", "immunohistochemistry", "chelsea", "coffee"],
+     pytest.param("retina", marks=pytest.mark.slow), "immunohistochemistry",
+     "chelsea", "coffee"],
 )  # fmt: skip
 def test_other_pictures_are_refused(tmp_path, name):
     path = save(tmp_path / f"{name}.png", getattr(data, name)())

@@ -35,9 +35,9 @@ def scan(model, incidence, step, *, noise=0.0, floor=0.0, ratios=False):
     ("model", "given", "start", "free", "relative"),
     [
         # A lobe of noise alone, begun five times too wide
-        ((1.48, 0.3, 0.031), {"incidence": 30, "step": 10, "floor": 0.01}, 5.0, ALL[:3], False),
+        pytest.param((1.48, 0.3, 0.031), {"incidence": 30, "step": 10, "floor": 0.01}, 5.0, ALL[:3], False, marks=pytest.mark.slow),
         # A lobe between the readings: most of them are exactly 0
-        ((1.4, 7.0, 0.0075), {"incidence": 0, "step": 10, "noise": 0.01}, 6.0, ALL[2:3], True),
+        pytest.param((1.4, 7.0, 0.0075), {"incidence": 0, "step": 10, "noise": 0.01}, 6.0, ALL[2:3], True, marks=pytest.mark.slow),
         # Ratios at the normal, which tell nothing of five parameters
         ((1.5, 0.0, 0.83), {"incidence": 0, "step": 10, "noise": 0.1, "ratios": True}, 0.35, ALL, False),
     ],

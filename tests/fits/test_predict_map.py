@@ -51,32 +51,33 @@ def over_bins(found: fitting.Prediction, run: xr.Dataset, phi_i: float) -> np.nd
     )  # fmt: skip
 
 
-def off_by(
-    surface: HeightMap, element: tuple[int, int] = (0, 0), phi_i: float | str = "uniform"
-) -> float:
+def off_by(surface: HeightMap, phi_i: float | str = "uniform") -> list[float]:
     """Rms of prediction less Monte Carlo over the map, beyond the noise of the latter.
 
-    Over the rms M10 for M10, over each M00 for M00.
+    Of M00, over each M00; and of M10, over the rms M10.
     """
     theta_i = np.deg2rad([10.0, 30.0, 50.0])
     # Bins count that plain rays resolve: dimmer ones show the lumps of single facets
     run = simulate(
-        Scene(surface, GLASS), theta_i, phi_i=phi_i, n_rays=100_000, n_theta=30,
-        n_dphi=36, stokes="linear", seed=4, variance_reduction=False,
+        Scene(surface, GLASS), theta_i, phi_i=phi_i, n_rays=100_000, n_theta=15,
+        n_dphi=18, stokes="linear", seed=4, variance_reduction=False,
     )  # fmt: skip
     found = fitting.predict(surface, GLASS, wavelength=0.65)
     mean = over_bins(found, run, 0.0 if phi_i == "uniform" else float(phi_i))
-    at = (..., *element)
-    traced = run.brdf_total.values[at]
     noise = np.sqrt((run.brdf_stderr.values**2).sum(0))
     whole = run.brdf_total.values[..., 0, 0]
     seen = whole > 0.05 * whole.max(axis=(1, 2), keepdims=True)
     seen &= noise[..., 0, 0] < 0.1 * whole
-    size = np.where(seen, whole, 1)
-    if element != (0, 0):
-        size = np.full_like(whole, np.sqrt(np.mean(traced[seen] ** 2)))
-    off, chance = ((mean[at] - traced) / size)[seen], (noise[at] / size)[seen]
-    return float(np.sqrt(np.maximum(np.mean(off**2) - np.mean(chance**2), 0)))
+    found_off = []
+    for at in ((..., 0, 0), (..., 1, 0)):
+        traced = run.brdf_total.values[at]
+        size = np.where(seen, whole, 1)
+        if at[1:] != (0, 0):
+            size = np.full_like(whole, np.sqrt(np.mean(traced[seen] ** 2)))
+        off, chance = ((mean[at] - traced) / size)[seen], (noise[at] / size)[seen]
+        square = np.mean(off**2) - np.mean(chance**2)
+        found_off.append(float(np.sqrt(np.maximum(square, 0))))
+    return found_off
 
 
 @pytest.mark.parametrize(
@@ -87,11 +88,8 @@ def off_by(
         pytest.param(0.5, marks=pytest.mark.slow),
     ],
 )
-@pytest.mark.parametrize("element", [(0, 0), (1, 0)])
-def test_clean_map_has_the_monte_carlo_over_it(
-    slope: float, element: tuple[int, int]
-) -> None:
-    assert off_by(ground(slope), element) < 0.08
+def test_clean_map_has_the_monte_carlo_over_it(slope: float) -> None:
+    assert max(off_by(ground(slope))) < 0.08
 
 
 # A quarter of the facets at 1 um, 256 x 256, are so few that their own lumps make 11 %
@@ -105,7 +103,7 @@ def test_each_azimuth_of_a_brushed_map_has_its_own_monte_carlo(
     brushed = GaussianSurface(
         shape=(nodes, nodes), spacing=spacing, corr_length=(6.0, 18.0), height_rms=1.2
     ).sample(seed=3)
-    assert off_by(brushed, phi_i=phi_i) < 0.08
+    assert off_by(brushed, phi_i=phi_i)[0] < 0.08
 
 
 def test_small_patches_where_rugged_and_large_where_smooth() -> None:

@@ -80,6 +80,7 @@ def test_what_a_coarse_map_leaves_out_is_said():
         fitting.predict(coarse, Material(1.5), wavelength=WAVE)
 
 
+@pytest.mark.slow
 def test_the_command_tells_the_beam(tmp_path):
     np.save(tmp_path / "map.npy", drawn(periodic=True).heights[:128, :128])
     words = ["predict", str(tmp_path / "map.npy"), "--spacing-um", "0.2", "--n", "1.5"]

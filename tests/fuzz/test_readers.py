@@ -7,8 +7,9 @@ from tests.fuzz.run import READERS, run
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_damaged_files_are_refused_by_name(name):
-    tally, faults = run(name, 60, seed=7)
+@pytest.mark.parametrize("count", [20, pytest.param(60, marks=pytest.mark.slow)])
+def test_damaged_files_are_refused_by_name(name, count):
+    tally, faults = run(name, count, seed=7)
     assert not faults, tally
     assert tally.get("refused", 0) > 5
 
