@@ -125,6 +125,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _fail(error, _sentence(error))
         except MemoryError as error:
             return _fail(error, f"out of memory. {_MEMORY}", FAILED)
+        except UnicodeEncodeError as error:
+            text = str(error.object[max(error.start - 20, 0) : error.end])
+            return _fail(error, f"{text!a} cannot be written as UTF-8. Rename that file.")
         except ValueError as error:
             return _fail(error, _in_words_of_the_command(_sentence(error), arguments))
         except (KeyboardInterrupt, typer.Abort) as error:

@@ -1,5 +1,6 @@
 """Outputs appear whole or not at all, whatever happens to the process or the disk."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 from pbrdf import HeightMap, Scene, load_scene
+from pbrdf.cli import main
 from pbrdf.files import complete_file, complete_folder
 from pbrdf.files.writing import ExistsError
 from tests.faults.run import SCENE
@@ -269,3 +271,15 @@ def test_a_refusal_names_the_output_and_not_its_stage(
     with pytest.raises(PermissionError) as caught, complete(tmp_path / "out.nc"):
         pass
     assert caught.value.filename == str(tmp_path / "out.nc")
+
+
+@pytest.mark.slow
+def test_names_that_are_no_text_are_refused_with_a_cure(tmp_path, capsys):
+    """The record of a fit names its file."""
+    path = tmp_path / os.fsdecode(b"scan\xfe.csv")
+    rows = "".join(f"30,{v},{0.2 - abs(v - 30) / 900:.4f}\n" for v in range(-60, 65, 10))
+    path.write_text(f"theta_i_deg,theta_view_deg,M00\n{rows}")
+    given = ["--n", "1.5", "--slope-rms", "0.2", "-o", str(tmp_path / "out")]
+    assert main(["--quiet", "fit", str(path), *given]) == 2
+    assert "scan\\udcfe' cannot be written as UTF-8. Rename" in capsys.readouterr().err
+    assert names(tmp_path) == [path.name]
