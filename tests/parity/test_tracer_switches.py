@@ -80,7 +80,8 @@ def test_walk_and_embree_agree_on_a_labelled_diffuse_surface():
 def test_any_number_of_workers_gives_the_same_bits(skips, fixed, phi_i):
     surface = SURFACE.sample(1) if fixed else SURFACE
     one, two, five = (
-        run(surface, seed=11, workers=n, skips=skips, phi_i=phi_i) for n in (1, 2, 5)
+        run(surface, seed=11, workers=n, skips=skips, phi_i=phi_i, n_rays=320)
+        for n in (1, 2, 5)
     )
     for other in (two, five):
         assert one.identical(other)
