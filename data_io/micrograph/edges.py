@@ -146,13 +146,19 @@ def _step(
         # The border is nowhere near the amount of material: no step at all
         return 1.0, np.zeros(slope.size)
     centre, mean = (bins[:-1] + 0.125)[filled], total[filled] / count[filled]
-    (_, width, _, _), _ = optimize.curve_fit(
-        lambda d, shift, w, low, high: low + (high - low) * special.ndtr((d - shift) / w),
-        centre,
-        mean,
-        p0=(0.0, 1.5, 0.0, 1.0),
-        bounds=([-2, 0.1, -0.5, 0.5], [2, 15, 0.5, 1.5]),
-    )
+    try:
+        (_, width, _, _), _ = optimize.curve_fit(
+            lambda d, shift, w, low, high: (
+                low + (high - low) * special.ndtr((d - shift) / w)
+            ),
+            centre,
+            mean,
+            p0=(0.0, 1.5, 0.0, 1.0),
+            bounds=([-2, 0.1, -0.5, 0.5], [2, 15, 0.5, 1.5]),
+        )
+    except RuntimeError:
+        # The fit goes round without an end: the mean is like no step
+        return 1.0, np.zeros(slope.size)
     model = special.ndtr(distance / (width * np.sqrt(1 + slope**2)))
     residual = (scaled - model) ** 2
     # Beyond the window there is grain alone; the median leaves specks out

@@ -437,3 +437,10 @@ def test_drop_photograph_is_no_edge():
     path = Path(os.environ["PBRDF_SHARED"]) / "data/images/sessile_drop.png"
     with pytest.raises(DataFileError, match="expected"):
         read_profile_image(path, PIXEL)
+
+
+def test_a_width_that_a_fit_does_not_find_is_tried_again():
+    # A JPEG with damaged coefficients: the first fit of its step went round without an end
+    case = Path(__file__).parents[1] / "cases" / "surface" / "edge_damaged.jpg"
+    found = read_profile_image(case, um_per_pixel=0.5)
+    assert 0.0 < found.blur < 1.0
