@@ -23,6 +23,8 @@ FULL = {
     "core_seconds": 120.0,
 }  # fmt: skip
 QUICK = FULL | {"side": 128, "n_rays": 4000, "seeds": 4, "error": 0.01, "core_seconds": 8.0}
+# Of the figure [%]
+LOWEST = 0.1
 LOOKS = {
     "reduced": "C0o-", "plain": "C1s-", "NumPy + embreex": "C2^-",
     "Mitsuba 3": "C4v-",
@@ -67,16 +69,38 @@ def draw(results: list[dict[str, Any]], path: Path) -> None:
     figure = Figure(figsize=(3.0 * columns, 2.6 * rows), layout="constrained")
     panels = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
     seen: dict[str, Any] = {}
+    lengths = [
+        one
+        for result in results
+        for found in result["ways"].values()
+        for one in found["runs"]
+    ]
+    seconds = [one["core_seconds"] for one in lengths]
+    span = np.geomspace(0.5 * min(seconds), 2.0 * max(seconds), 50)
+    highest = 150.0 * max(one["rms"] for one in lengths)
     for panel, result in zip(panels, results, strict=False):
         for name, found in result["ways"].items():
             times, errors = np.array(
                 [[one["core_seconds"], 100.0 * one["rms"]] for one in found["runs"]]
             ).T
-            (line,) = panel.loglog(times, errors, LOOKS[name], ms=4)
+            # Exact results lie on the lower edge
+            (line,) = panel.loglog(
+                times,
+                np.maximum(errors, LOWEST),
+                LOOKS[name],
+                ms=4,
+                clip_on=False,
+                zorder=3,
+            )
             seen.setdefault(name, line)
+            # What the spread at all lengths foretells for others
+            spread = 100.0 * np.sqrt(found["variance"]["rms"] / span)
+            panel.loglog(span, spread, color=line.get_color(), lw=0.7, alpha=0.6)
         if result["model_rms"] is not None:
             seen["model"] = panel.axhline(100.0 * result["model_rms"], color="0.4", ls=":")
         panel.axhline(1.0, color="0.8", lw=0.8, zorder=0)
+        panel.set_xlim(span[0], span[-1])
+        panel.set_ylim(LOWEST, highest)
         panel.set_title(_title(result), fontsize="medium")
     for panel in panels[: len(results)][-columns:]:
         panel.set_xlabel("processor time [s]")
@@ -90,8 +114,12 @@ def draw(results: list[dict[str, Any]], path: Path) -> None:
 
 
 def _title(result: dict[str, Any]) -> str:
-    gained = (result["gain"] or {}).get("rms")
-    return result["case"] + ("" if gained is None else f": {gained:.3g} times")
+    if result["gain"] is None:
+        return str(result["case"])
+    gained = result["gain"]["rms"]
+    if gained is None:
+        return f"{result['case']}: exact"
+    return f"{result['case']}: {gained:.{0 if gained >= 10.0 else 1}f} times"
 
 
 def table(result: dict[str, Any]) -> list[str]:
