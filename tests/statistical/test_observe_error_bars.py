@@ -1,5 +1,7 @@
 """Are the standard errors of `observe` those of its results, and its knobs free?"""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -37,17 +39,43 @@ def spread_over_stated(scene, seeds, **options):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("estimator", "albedo"),
-    [("facets", 0.0), ("corners", 0.0), ("paths", 0.4)],
+    ("estimator", "albedo", "reduced"),
+    [
+        ("facets", 0.0, False),
+        ("facets", 0.0, True),
+        ("corners", 0.0, True),
+        ("paths", 0.4, False),
+    ],
 )
-def test_errors_over_realizations(estimator, albedo):
-    scene = Scene(SURFACE, Material(1.5, diffuse_albedo=albedo))
+def test_errors_over_realizations(estimator, albedo, reduced):
+    surface, scan = SURFACE, SCAN
+    if reduced:
+        # Steep and low, so that many facets are hidden: of few, one more is allowed for
+        surface = replace(SURFACE, slope_rms=0.5)
+        scan = SCAN | {"theta_i": 1.1, "theta_s": np.array([1.1, 0.8, 1.0, 0.9])}
     ratio = spread_over_stated(
-        scene, range(40), n_rays=4000, realizations=24, estimator=estimator,
-        start="source", hemisphere_samples=1.0,
+        Scene(surface, Material(1.5, diffuse_albedo=albedo)), range(40), n_rays=4000,
+        realizations=24, estimator=estimator, start="source", hemisphere_samples=1.0,
+        variance_reduction=reduced, **scan,
     )  # fmt: skip
     # Variance of 40 seeds, some of their 8 numbers correlated: a tenth each way
     assert 0.7 < ratio < 1.35
+
+
+def test_where_nothing_is_hidden_the_error_is_that_of_one_facet_more():
+    runs = [
+        observe(
+            Scene(SURFACE, Material(1.5)), **SCAN, **CONES, n_rays=4000, realizations=24,
+            seed=seed, hemisphere_samples=1.0, max_bounces=1,
+        )
+        for seed in range(6)
+    ]  # fmt: skip
+    values, errors = (
+        np.array([run[name].values[0, :, 0, 0] for run in runs])
+        for name in ("brdf", "brdf_stderr")
+    )
+    assert (values.std(axis=0) < 1.5 * errors.mean(axis=0)).all()
+    assert (errors < 2e-3 * values).all()
 
 
 @pytest.mark.slow
