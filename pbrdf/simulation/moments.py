@@ -176,7 +176,12 @@ class Moments:
         Their arrays are those of the moments, which are used up.
         """
         if self.balance is not None:
-            self.balance.settle(self._mean, self._scatter, self._scatter_total)
+            # One wavelength after another: copies of the moments are made on the way
+            for w in range(self._mean.shape[1]):
+                own = slice(None), slice(w, w + 1)
+                self.balance.of_waves(own).settle(
+                    self._mean[own], self._scatter[own], self._scatter_total[own]
+                )
         total = self._mean.sum(axis=2)
         self._estimate(self._mean, self._scatter, self._one_path())
         self._estimate(total, self._scatter_total, self._one_of_all())

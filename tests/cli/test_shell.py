@@ -25,6 +25,7 @@ from pbrdf.cli.showing.doctor import self_test
 from pbrdf.cli.showing.export import _accuracy_lines
 from pbrdf.cli.showing.init import Kind
 from pbrdf.cli.wording import in_options, options_of
+from pbrdf.errors import AccuracyWarning
 from pbrdf.optics.exchange import convert_brdf
 
 
@@ -72,7 +73,9 @@ def test_a_starter_mesh_takes_the_file_beside_it_and_all_that_it_remarks_on(tmp_
     path = tmp_path / "scene.toml"
     trimesh.creation.box((0.03, 0.03, 0.002)).export(tmp_path / "mesh.stl")
     assert main(["init", str(path), "--kind", "mesh"]) == 0
-    assert load_scene(path).surface.kind == "bodies"
+    # Thirty micrometres in millimetres, of which the file says nothing
+    with pytest.warns(AccuracyWarning, match="no unit is named"):
+        assert load_scene(path).surface.kind == "bodies"
     text = path.read_text()
     for key in ("unit", "period_um", "labels"):
         text = text.replace(f"# {key} =", f"{key} =")

@@ -41,7 +41,10 @@ class Balance:
         self._taken = np.zeros(shape[:2])
 
     def of_waves(self, own: tuple[slice, slice]) -> "Balance":
-        """Return that of the wavelengths at a place of arrays (angles, wavelengths)."""
+        """Return that of the wavelengths at a place of arrays (angles, wavelengths).
+
+        What it settles is noted in its parent, too.
+        """
         part = copy(self)
         for name in ("_cross", "_cross_total", "_taken"):
             setattr(part, name, getattr(self, name)[own])
@@ -110,7 +113,7 @@ class Balance:
         light = mean[..., 0, 0]
         slope = light * further[:, None, None, None, None]
         slope[:, :, 0] = light[:, :, 0] * single[:, None]
-        self._taken = slope[:, :, 0].sum(axis=(2, 3))
+        self._taken[:] = slope[:, :, 0].sum(axis=(2, 3))
         if len(self._excess) > 1:
             spread = self._over_samples(np.var, self._excess) * len(self._excess)
             _adjust(scatter, mean, slope, self._cross, spread)
