@@ -125,7 +125,7 @@ def _clear(stage: Path) -> None:
     for _ in range(100):
         shutil.rmtree(stage, ignore_errors=True)
         gone = 0 if stage.exists() else gone + 1
-        if gone > 2:
+        if gone > 8:
             return
         time.sleep(0.02)
 
