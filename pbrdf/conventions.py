@@ -18,6 +18,11 @@ class Variable(NamedTuple):
     long_name: str
     dims: tuple[str, ...]
 
+    @property
+    def about(self) -> dict[str, str]:
+        """Its attributes in a dataset."""
+        return {"units": self.units, "long_name": self.long_name}
+
 
 _LIGHT = ("theta_i", "phi_i", "wavelength")
 _BOUNCES = ("bounces", *_LIGHT)

@@ -149,7 +149,7 @@ def told(count: float) -> str:
     return f"{count / 1e9:.3g} GB" if count >= 1e9 else f"{count / 1e6:.0f} MB"
 
 
-def check_room(need: float, what: str, cure: str) -> None:
+def check_room(need: float, what: str, cure: str, room: float | None = None) -> None:
     """Refuse what takes more than `SHARE` of the free memory.
 
     Parameters
@@ -160,13 +160,15 @@ def check_room(need: float, what: str, cure: str) -> None:
         What it is, with the numbers that make it so large.
     cure : str
         What to change; one sentence.
+    room : float, optional
+        The free memory, where that was asked for already. [bytes]
 
     Raises
     ------
     ValueError
         If it takes more.
     """
-    room = free_bytes()
+    room = free_bytes() if room is None else room
     if need > SHARE * room:
         msg = (
             f"the run must take at most {SHARE:.0%} of the free memory, {told(room)}; it "
@@ -175,8 +177,10 @@ def check_room(need: float, what: str, cure: str) -> None:
         raise ValueError(msg)
 
 
-def check_surface(surface: object) -> None:
+def check_surface(surface: object, room: float | None = None) -> None:
     """Refuse a surface of which not even one sample fits into the memory that is free.
+
+    `room` as of `check_room`.
 
     Raises
     ------
@@ -187,4 +191,4 @@ def check_surface(surface: object) -> None:
     if shape:
         nodes = f"{' x '.join(map(str, shape))} nodes of the surface"
         cure = "Take a surface of a smaller shape."
-        check_room(NODE * math.prod(shape), nodes, cure)
+        check_room(NODE * math.prod(shape), nodes, cure, room)

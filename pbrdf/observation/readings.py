@@ -1,5 +1,6 @@
 """Readings of a goniometer from samples of a surface: means, standard errors, dataset."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from pbrdf.kernels.cones import facets as observe_facets
 from pbrdf.kernels.paths import shading
 from pbrdf.observation.expected import Expected
 from pbrdf.observation.look import Look, Sight
+from pbrdf.validity import variables
 
 __all__ = ["Readings", "as_scan", "to_dataset"]
 
@@ -142,9 +144,16 @@ def _and_total(by_bounces: np.ndarray) -> np.ndarray:
 
 
 def to_dataset(
-    seen: Readings, *, wavelength: np.ndarray | None, attrs: dict[str, Any]
+    seen: Readings,
+    judged: Mapping[str, np.ndarray],
+    *,
+    wavelength: np.ndarray | None,
+    attrs: dict[str, Any],
 ) -> xr.Dataset:
-    """Label the readings: one dimension `geometry`, as a measured scan has it."""
+    """Label the readings: one dimension `geometry`, as a measured scan has it.
+
+    `judged` are numbers of the limits of geometric optics.
+    """
     look = seen.look
     spectral = wavelength is not None and wavelength.ndim == 1
     # (geometry, bounces, wavelength, ...) to (bounces, wavelength, geometry, ...)
@@ -165,11 +174,10 @@ def to_dataset(
     data: dict[str, Any] = {}
     for name, (dims, values) in arrays.items():
         entry = RESULT_VARIABLES[name]
-        about = {"units": entry.units, "long_name": entry.long_name}
         if not spectral:
             values = values.squeeze(dims.index("wavelength"))
             dims = tuple(dim for dim in dims if dim != "wavelength")
-        data[name] = (dims, values, about)
+        data[name] = (dims, values, entry.about)
     for name, values, long_name in (
         ("source_solid_angle", omega_i, "projected solid angle of the source"),
         ("detector_solid_angle", omega_s, "projected solid angle of the detector"),
@@ -179,6 +187,7 @@ def to_dataset(
         ("bounces", "geometry"), seen.caught.T,
         {"units": "1", "long_name": "paths that joined source and detector"},
     )  # fmt: skip
+    data |= variables(judged, spectral=spectral, axis="geometry")
 
     coords: dict[str, Any] = {
         "bounces": list(BOUNCES),

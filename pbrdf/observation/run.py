@@ -29,7 +29,7 @@ from pbrdf.surface import (
 from pbrdf.tracer import arguments
 from pbrdf.tracer.asked import Run
 from pbrdf.tracer.media import covering_materials, opaque_drop_notes
-from pbrdf.validity import attach, lost_light_warnings, lost_ray_warnings
+from pbrdf.validity import lost_light_warnings, lost_ray_warnings
 
 __all__ = ["ESTIMATORS", "as_scan", "observe"]
 
@@ -221,8 +221,9 @@ def observe(  # noqa: PLR0913  (the public signature)
     cut = _missing_light(seen, ("truncated",))
     # Told in any case, but no surprise to one who set a low limit
     _warn([*late, *(cut if look.max_bounces >= MOST_BOUNCES else ())])
-    result = to_dataset(
+    return to_dataset(
         seen,
+        judged.numbers,
         wavelength=run.waves,
         attrs=run.attributes(seen.samples)
         | {
@@ -235,7 +236,6 @@ def observe(  # noqa: PLR0913  (the public signature)
             "scene": scene_text(scene),
         },
     )
-    return attach(result, judged.numbers, axis="geometry")
 
 
 def _angles(

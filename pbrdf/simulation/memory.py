@@ -108,9 +108,10 @@ def check_run(scene: Scene, size: Size, effort: Effort) -> None:
     ValueError
         With what it would take, and what to change.
     """
-    check_surface(scene.surface)
+    room = free_bytes()
+    check_surface(scene.surface, room)
     need = at_work(scene, size, effort)
-    check_room(need, size.words(), f"{CURE}, fewer workers=, or {_PARTS}.")
+    check_room(need, size.words(), f"{CURE}, fewer workers=, or {_PARTS}.", room)
 
 
 def at_work(scene: Scene, size: Size, effort: Effort, *, among: int | None = None) -> float:

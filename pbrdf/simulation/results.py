@@ -1,7 +1,7 @@
 """Result datasets: labelled axes, units from one table, attributes that tell all."""
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -42,16 +42,17 @@ from pbrdf.tracer.media import opaque_drop_notes
 from pbrdf.tracer.thin_films import thin_absorber_warnings
 from pbrdf.validity import (
     Judgement,
-    attach,
     judge_contaminants,
     lost_light_warnings,
     lost_ray_warnings,
+    variables,
 )
 
 
 def to_dataset(
     moments: Sequence[Moments],
     scene: Scene,
+    judged: Mapping[str, np.ndarray],
     *,
     several: bool,
     wavelength: np.ndarray | None,
@@ -59,43 +60,26 @@ def to_dataset(
 ) -> xr.Dataset:
     """Normalise the tallies of each azimuth to a Mueller BRDF and label every axis.
 
-    Counts in the attributes are sums over azimuths; with `several` of them the dimension
-    `phi_i` follows theta_i.
+    `judged` are numbers of the limits of geometric optics. Counts in the attributes are
+    sums over azimuths; with `several` of them the dimension `phi_i` follows theta_i.
     """
     plan = moments[0].plan
-    theta_s, dphi, _ = detector_bins(plan.n_theta, plan.n_dphi)
     spectral = wavelength is not None and wavelength.ndim == 1
-    coords: dict[str, Any] = {
-        "bounces": list(BOUNCES),
-        "theta_i": plan.theta_i,
-        "theta_s": theta_s,
-        "dphi": dphi,
-        "stokes_out": list(STOKES[: plan.n_stokes]),
-        "stokes_in": list(STOKES[: plan.n_stokes]),
-    }
-    if several:
-        coords["phi_i"] = [one.plan.phi_i for one in moments]
-    if wavelength is not None:
-        coords["wavelength"] = wavelength if spectral else float(wavelength)
-
     rel_error = max(one.rel_error() for one in moments)
     layers = [_estimates(one) for one in moments]
     data: dict[str, Any] = {}
     for name, array in layers[0].items():
-        dims = tuple(d for d in RESULT_VARIABLES[name].dims if several or d != "phi_i")
+        entry = RESULT_VARIABLES[name]
+        dims = tuple(d for d in entry.dims if several or d != "phi_i")
         if "phi_i" in dims:
             array = np.stack([one[name] for one in layers], dims.index("phi_i"))
         if "wavelength" in dims and not spectral:
             array = array.squeeze(dims.index("wavelength"))
             dims = tuple(d for d in dims if d != "wavelength")
-        data[name] = (dims, array)
-    dataset = xr.Dataset(data, coords)
-    for variable in dataset.variables:
-        entry = RESULT_VARIABLES[str(variable)]
-        dataset[variable].attrs = {"units": entry.units, "long_name": entry.long_name}
-
+        data[name] = (dims, array, entry.about)
+    data |= variables(judged, spectral=spectral)
     counts = np.sum([one.counts for one in moments], axis=0)
-    dataset.attrs = attrs | {
+    told = attrs | {
         "version": __version__,
         "scene": scene_text(scene),
         "rays_per_direction": plan.n_rays * moments[0].samples,
@@ -109,7 +93,31 @@ def to_dataset(
         "medium_mismatches": int(counts[:, N_MISMATCH].sum()),
         "rel_error": rel_error,
     }
-    return dataset
+    azimuths = [one.plan.phi_i for one in moments] if several else None
+    return xr.Dataset(data, _axes(plan, azimuths, wavelength), told)
+
+
+def _axes(
+    plan: Plan, azimuths: list[float | None] | None, wavelength: np.ndarray | None
+) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
+    """Coordinates of a result; `azimuths` where they are a dimension."""
+    theta_s, dphi, _ = detector_bins(plan.n_theta, plan.n_dphi)
+    axes: dict[str, Any] = {
+        "bounces": list(BOUNCES),
+        "theta_i": plan.theta_i,
+        "theta_s": theta_s,
+        "dphi": dphi,
+        "stokes_out": list(STOKES[: plan.n_stokes]),
+        "stokes_in": list(STOKES[: plan.n_stokes]),
+    }
+    if azimuths is not None:
+        axes["phi_i"] = azimuths
+    if wavelength is not None:
+        axes["wavelength"] = wavelength if wavelength.ndim else float(wavelength)
+    return {
+        name: ((name,) if np.ndim(values) else (), values, RESULT_VARIABLES[name].about)
+        for name, values in axes.items()
+    }
 
 
 def _estimates(moments: Moments) -> dict[str, np.ndarray]:
@@ -166,6 +174,7 @@ def labelled(
     result = to_dataset(
         moments,
         scene,
+        {**judged.numbers, **laid.numbers},
         several=ready.several,
         wavelength=run.waves,
         attrs=run.attributes(done)
@@ -182,7 +191,6 @@ def labelled(
             "warnings": [*judged.notes, *late, *judged.remarks, *cut],
         },
     )  # fmt: skip
-    result = attach(result, {**judged.numbers, **laid.numbers})
     return result if wave is None else join_waves(result, scene, wave)
 
 

@@ -2,16 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pbrdf.conventions import RESULT_VARIABLES
 from pbrdf.errors import percent
 from pbrdf.validity.roughness import FLAT, Roughness
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Share of the light in a coherent beam that geometric optics may miss
 MOST_COHERENT = 0.01
@@ -196,23 +192,23 @@ of three and more by up to 28 %. Take at least 5, a spacing of corr_length / 5 o
     return notes
 
 
-def attach(
-    dataset: "xr.Dataset", numbers: Mapping[str, np.ndarray], *, axis: str = "theta_i"
-) -> "xr.Dataset":
-    """Add the numbers of a judgement to a result, with units from the one table.
+def variables(
+    numbers: Mapping[str, np.ndarray], *, spectral: bool, axis: str = "theta_i"
+) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]:
+    """Dimensions, values and attributes of numbers of a judgement, for a result.
 
-    `axis` is the dimension of the result along which theta_i runs.
+    `axis` is the dimension of the result along which theta_i runs; without `spectral` it
+    has none of the wavelength.
     """
-    added = {}
+    found = {}
     for name, values in numbers.items():
         entry = RESULT_VARIABLES[name]
         dims = tuple(axis if dim == "theta_i" else dim for dim in entry.dims)
-        if "wavelength" in dims and "wavelength" not in dataset.dims:
+        if "wavelength" in dims and not spectral:
             values = np.squeeze(values, dims.index("wavelength"))
             dims = tuple(dim for dim in dims if dim != "wavelength")
-        about = {"units": entry.units, "long_name": entry.long_name}
-        added[name] = (dims, values, about)
-    return dataset.assign(added)
+        found[name] = (dims, values, entry.about)
+    return found
 
 
 def _place(theta: float, wave: float) -> str:

@@ -26,9 +26,14 @@ TABLES = {
 }  # fmt: skip
 
 
+def free(monkeypatch, room):
+    for module in (memory, pbrdf.simulation.memory):
+        monkeypatch.setattr(module, "free_bytes", lambda: room)
+
+
 @pytest.mark.parametrize("more", [{}, {"target_rel_error": 0.1}])
 def test_a_result_of_sixty_gigabytes_is_refused_at_once(monkeypatch, more):
-    monkeypatch.setattr(memory, "free_bytes", lambda: 64e9)
+    free(monkeypatch, 64e9)
     start = time.process_time()
     with pytest.raises(ValueError, match=r"200 directions x 100 wavelengths.*n_theta="):
         pbrdf.simulate(
@@ -39,7 +44,7 @@ def test_a_result_of_sixty_gigabytes_is_refused_at_once(monkeypatch, more):
 
 def refused_here(monkeypatch, run, match):
     """Check that a run is refused where nothing is free, and before a ray is traced."""
-    monkeypatch.setattr(memory, "free_bytes", lambda: 1e6)
+    free(monkeypatch, 1e6)
     for place in ("simulation.samples", "observation.samples"):
         monkeypatch.setattr(f"pbrdf.{place}.gather", None)
     with pytest.raises(ValueError, match=match):
@@ -67,10 +72,10 @@ def test_a_sweep_is_foretold_as_a_whole(monkeypatch, tmp_path):
         {"theta_i_deg": [30.0], "n_rays": 1000, "realizations": 2},
     )  # fmt: skip
     # A point alone would fit
-    monkeypatch.setattr(memory, "free_bytes", lambda: 90e6)
+    free(monkeypatch, 90e6)
     with pytest.raises(ValueError, match=r"50 points held.*-o name\.zarr"):
         computed(sweep, workers=1)
-    monkeypatch.setattr(memory, "free_bytes", lambda: 80e6)
+    free(monkeypatch, 80e6)
     with pytest.raises(ValueError, match=r"groups at once.*workers="):
         run_sweep(sweep, tmp_path / "s.zarr", workers=2)
 
