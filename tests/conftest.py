@@ -1,5 +1,6 @@
 """What every test may use: measured data where present, no window, patient hypothesis."""
 
+import gc
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,15 @@ import pytest
 from hypothesis import settings
 
 mpl.use("Agg")
+
+# Modules and 5000 tests stay: to look through them for garbage again and again was a
+# quarter of the time of collection
+gc.set_threshold(50_000, 20, 20)
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
+
 
 # The first example of a property compiles the kernels under it
 settings.register_profile("pbrdf", deadline=None, derandomize=True, max_examples=50)
