@@ -94,8 +94,11 @@ def test_sums_over_orders_take_every_order(law, dimensions, g, kappa) -> None:
     least = max(1, int(g - 14 * np.sqrt(g) - 30))
     mpmath.mp.dps = 30
     total = [mpmath.mpf(0)] * 5
+    weight = mpmath.exp(
+        -mpmath.mpf(g) + (least - 1) * mpmath.log(g) - mpmath.loggamma(least)
+    )
     for n in range(least, bound):
-        weight = mpmath.exp(-mpmath.mpf(g) + n * mpmath.log(g) - mpmath.loggamma(n + 1))
+        weight *= mpmath.mpf(g) / n
         if law == GAUSSIAN:
             unit = mpmath.sqrt(mpmath.pi / n) ** dimensions
             spectrum = unit * length**dimensions * mpmath.exp(-mpmath.mpf(kappa) / n)

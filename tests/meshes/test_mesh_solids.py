@@ -74,7 +74,7 @@ def test_sphere_by_order_and_its_facets_by_refinement(kappa, depth):
 def test_slab_and_film_on_a_metal_in_all_elements(base, kappa):
     """Powers add up, incoherently; the lower side of the film lies below the metal's."""
     theta, index, metal = 0.7, 1.5 + 1j * kappa, 0.9 + 2.4j
-    options = {"n_rays": 32_000, "phi_i": 0.4, "n_theta": 9, "n_dphi": 12}
+    options = {"n_rays": 16_000, "phi_i": 0.4, "n_theta": 9, "n_dphi": 12}
     results = []
     for seed in range(6):
         if base == "air":

@@ -55,7 +55,10 @@ def labelled():
 CASES = {
     "full": ({}, {}),
     "linear": ({}, {"stokes": "linear"}),
-    "unpolarized": ({}, {"stokes": "unpolarized", "phi_i": "uniform"}),
+    "unpolarized": (
+        {},
+        {"stokes": "unpolarized", "phi_i": "uniform", "theta_i": ANGLES[2:]},
+    ),
     "cut": ({}, {"max_bounces": 1, "variance_reduction": False}),
     "plain": ({}, {"variance_reduction": False}),
     "coarse": ({}, {"n_theta": 5, "n_dphi": 6}),
@@ -83,13 +86,20 @@ def test_sums_by_bin_give_the_light_of_every_path(case):
     assert_allclose(budget + by_bin.absorbed + by_bin.left_sideways, 1.0, atol=1e-9)
 
 
+UNIFORM = {
+    "surface": GaussianSurface(
+        shape=(96, 96), spacing=1.0, corr_length=12.0, slope_rms=0.4
+    ),
+    "phi_i": "uniform", "theta_i": ANGLES[1:3],
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("fold", [False, True])
 def test_paths_that_overflow_their_buffer_are_shaded_too(fold, monkeypatch):
     """Some hundred times a sample here, and in some samples and directions only."""
-    surface = GaussianSurface(shape=(96, 96), spacing=1.0, corr_length=12.0, slope_rms=0.4)
-    options = {"surface": surface, "phi_i": "uniform", "fold": fold, "gathered": True}
+    options = UNIFORM | {"n_rays": 600, "fold": fold, "gathered": True}
     plain = run(**options)
-    for rows in (0, 1000):
+    for rows in (0, 200):
         monkeypatch.setattr(spectra, "BUFFER", rows)
         overflowing = run(**options)
         for name in VALUES:
@@ -97,8 +107,7 @@ def test_paths_that_overflow_their_buffer_are_shaded_too(fold, monkeypatch):
 
 
 def test_many_wavelengths_are_folded_as_one_is():
-    surface = GaussianSurface(shape=(96, 96), spacing=1.0, corr_length=12.0, slope_rms=0.4)
-    options = {"surface": surface, "phi_i": "uniform", "fold": True}
+    options = UNIFORM | {"fold": True}
     by_bin, by_path = (run(**options, gathered=gathered) for gathered in (True, False))
     for name in VALUES:
         largest = float(np.abs(by_path[name]).max())

@@ -46,7 +46,8 @@ DARK, DARKEST = 0.1, 1e-5
 # Slope rms below which rays do: all their light falls into a bin or two, and the panels of
 # the integral are as many as one over its square
 NARROWEST = 1e-3
-# Azimuths over which a spread source is averaged: from so many, doubled up to so many
+# Azimuths of a circle over which a spread source is averaged: from so many, doubled up to
+# so many
 FEW_AZIMUTHS, MANY_AZIMUTHS = 8, 256
 
 
@@ -340,13 +341,15 @@ def _averaged(
     if phi_i is not None:
         light = at([phi_i], cells)
     else:
-        number = FEW_AZIMUTHS
-        light = at(np.arange(number) * (2 * np.pi / number), cells)
+        # Half a circle of azimuths: the law is the same for a slope and its negative, and
+        # so is the light of a surface that is turned by half
+        number = FEW_AZIMUTHS // 2
+        light = at(np.arange(number) * (np.pi / number), cells)
         change = np.inf
-        while change > 1e-10 * cells[..., ALL].max() and number < MANY_AZIMUTHS:
+        while change > 1e-10 * cells[..., ALL].max() and 2 * number < MANY_AZIMUTHS:
             # Points between those that are there make a rule of twice as many
             between = np.empty_like(cells)
-            more = at((np.arange(number) + 0.5) * (2 * np.pi / number), between)
+            more = at((np.arange(number) + 0.5) * (np.pi / number), between)
             change = np.abs(between[..., ALL] - cells[..., ALL]).max()
             light, number = 0.5 * (light + more), 2 * number
             cells[..., :RISE_THETA] += between[..., :RISE_THETA]
