@@ -23,6 +23,7 @@ from pbrdf.memory import (
     free_bytes,
 )
 from pbrdf.scene.scene import Scene
+from pbrdf.simulation.singles.profiles import most_bytes
 from pbrdf.simulation.singles.single_bounce import LEAST_DPHI, LEAST_THETA
 from pbrdf.simulation.spectra import BUFFER, WORTHWHILE
 from pbrdf.surface import GaussianSurface, HeightMap
@@ -150,6 +151,8 @@ def at_work(scene: Scene, size: Size, effort: Effort, *, among: int | None = Non
     mapped = surface if clean and isinstance(surface, HeightMap) else None
     if effort.looks and (drawn_anew or mapped is not None):
         sights = _sights(size)
+        if drawn_anew:
+            sights += size.angles * size.azimuths * most_bytes(size.bins // LEAST_THETA)
         if mapped is not None:
             # What the points of each facet tell, and looks of each batch
             sights += 2.0 * mapped.heights.size * size.angles * size.azimuths

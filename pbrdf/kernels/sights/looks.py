@@ -3,17 +3,21 @@
 Facets of fitting slopes are put at random places of a realisation, one for each cell of
 directions of one azimuth. What the realisation's own slopes happen to be does not matter:
 only what stands around a facet does, and from which height on the facet is clear of it;
-that it lies so high has a known probability.
+that it lies so high has a known probability. Most looks draw what stands around
+(`pbrdf.kernels.sights.drawn`); those over the realisation correct their mean.
 """
 
 from collections import namedtuple
-from math import cos, erfc, exp, expm1, floor, log, log1p, sin, sqrt, tau
+from math import cos, erfc, floor, log, sin, sqrt, tau
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.bins.binning import HALF_PI
 from pbrdf.kernels.microfacet.facet import directions, mirror_facet
 from pbrdf.kernels.paths.random import uniform_pair
+from pbrdf.kernels.sights.drawn import draw_looks, take_mesh_looks
 from pbrdf.kernels.sights.light import RISE_DPHI, RISE_THETA, overhang
+from pbrdf.kernels.sights.profiles import corner_heights_by_slopes
+from pbrdf.kernels.sights.spread import tilted, tilted_density
 from pbrdf.kernels.sights.walk import Bend, Place, Rays, lift_clear
 
 # The ensemble: `SlopeLaw`; grid steps; for the facets below and above the diagonal the
@@ -23,13 +27,19 @@ from pbrdf.kernels.sights.walk import Bend, Place, Rays, lift_clear
 Ensemble = namedtuple("Ensemble", "law pitch_x pitch_y inverse regression remainder reach")
 # Numbers of the looks: the source's zenith and azimuth (uniform_phi: any), first edge of
 # dphi, cells (cells, cells, N_CELL) and which of them are looked at; by column of cells of
-# one dphi: how many places see it, and logarithmic change across it of their density;
-# stream of random numbers
+# one dphi: how many places see it in the mean, pairs of looks without a surface, and
+# logarithmic change across it of the density of looks; stream of random numbers; normal
+# numbers (pairs in all, nodes)
 Looks = namedtuple(
-    "Looks", "theta_i phi uniform_phi left cells wanted places change stream"
+    "Looks", "theta_i phi uniform_phi left cells wanted places pairs change stream normals"
 )
+# Room to work in: `rays` are `Rays` and `numbers` (N_OF_LOOK, cells), as long as a column
+# of cells; `drawn` is that of `draw_looks`
+LookRoom = namedtuple("LookRoom", "rays numbers drawn")
 PLASTIC_A, PLASTIC_B = 0.7548776662466927, 0.5698402909980532
-N_OF_LOOK = 3
+# Numbers of a look: rise of the exit ray, weight, one more than Smith's Lambdas, place
+# across its cell in zenith, and what it told
+OUT_RISE, OF_LOOK, OF_SMITH, ACROSS, TOLD, N_OF_LOOK = 0, 1, 2, 3, 4, 5
 GOLDEN = 0.6180339887498949
 # Share of the lowest facets of which one is looked at by chance; and a height above which
 # there is none, in standard deviations
@@ -50,22 +60,6 @@ def low_quantile(p):
     r -= 5.0
     up = ((0.017337203997 * r + 0.42868294337) * r + 3.0812263860) * r + 6.6579051150
     return -up / ((0.012258202635 * r + 0.24197894225) * r + 1.0)
-
-
-@jit(forceinline=True)
-def tilted(x, change):
-    """Turn a uniform number in [0, 1) into one of a density that grows by exp(change)."""
-    if abs(change) < 1e-6:
-        return x
-    return log1p(x * expm1(change)) / change
-
-
-@jit(forceinline=True)
-def tilted_density(x, change):
-    """Density at x in [0, 1) that grows by exp(change) and has the mean 1."""
-    if abs(change) < 1e-6:
-        return 1.0
-    return change * exp(change * x) / expm1(change)
 
 
 @jit(forceinline=True)
@@ -94,12 +88,9 @@ def facet_place(mesh, ensemble, i, j, u, v):
     pitch_x, pitch_y = ensemble.pitch_x, ensemble.pitch_y
     old_x = ((z_b - z_a) if low else (z_d - z_b)) / pitch_x
     old_y = ((z_d - z_b) if low else (z_b - z_a)) / pitch_y
-    # Heights of the first corner by a unit of slope, their mean being the regression's
-    first_x, first_y = ensemble.regression[k, 0], ensemble.regression[k, 1]
-    old_lift = (z_a + z_b + z_d) / 3.0 - first_x * old_x - first_y * old_y
-    first_x -= (2.0 if low else 1.0) * pitch_x / 3.0
-    first_y -= (1.0 if low else 2.0) * pitch_y / 3.0
-    step_x, step_y = pitch_x if low else 0.0, 0.0 if low else pitch_y
+    old_lift = (z_a + z_b + z_d) / 3.0
+    old_lift -= ensemble.regression[k, 0] * old_x + ensemble.regression[k, 1] * old_y
+    first_x, first_y, step_x, step_y = corner_heights_by_slopes(ensemble, k)
     inverse = ensemble.inverse
     return Place(
         i, j, u, v,
@@ -128,14 +119,14 @@ def steepness(cos_theta, sin_theta):
 
 
 @jit(forceinline=True)
-def look_up(mesh, ensemble, looks, column, m, number, rays, room):
+def look_up(mesh, ensemble, looks, column, m, number, rays, numbers):
     """Lift the facets of a column's cells at one place until they are seen from both ends.
 
     rays        `Rays`, one for each cell that is wanted
-    room        by cell (N_OF_LOOK, cells): rise of the exit ray, weight of the look, and
-                one more than Smith's Lambdas
+    numbers     by cell (N_OF_LOOK, cells), but for TOLD, which is left
 
-    Returns the unit of lift, and the lift below which none was looked at.
+    Returns the place, where across the column it looks, the unit of lift, and the lift
+    below which none was looked at.
     """
     n_theta, n_dphi = looks.wanted.shape
     nx, ny = mesh.terrain.heights.shape
@@ -150,8 +141,9 @@ def look_up(mesh, ensemble, looks, column, m, number, rays, room):
     cos_phi, sin_phi = cos(phi), sin(phi)
     law, change = ensemble.law, looks.change[column]
     # Evenly spread over the cells (Roberts' sequence)
-    b = start_b + m * PLASTIC_B
-    b = tilted(b - floor(b), change)
+    across = start_b + m * PLASTIC_B
+    across -= floor(across)
+    b = tilted(across, change)
     share = 1.0 / tilted_density(b, change)
     dphi = looks.left + tau / n_dphi * (column + b)
     cos_o, sin_o = cos(phi + dphi), sin(phi + dphi)
@@ -163,25 +155,26 @@ def look_up(mesh, ensemble, looks, column, m, number, rays, room):
             continue
         cell = looks.cells[row, column]
         a = start_a + m * PLASTIC_A + row * GOLDEN
-        a = tilted(a - floor(a), cell[RISE_THETA])
-        theta_s = HALF_PI / n_theta * (row + a)
+        a -= floor(a)
+        numbers[ACROSS, k] = a
+        theta_s = HALF_PI / n_theta * (row + tilted(a, cell[RISE_THETA]))
         way = directions(looks.theta_i, theta_s, dphi, cos_phi, sin_phi)
         facet = mirror_facet(way)
         set_ray(rays, k, place, facet.slope_x, facet.slope_y)
         rays.rise[k] = steepness(cos_i, sin_i)
         rays.lift[k] = lowest
         hidden_s = overhang(law, way.cos_s, way.sin_s, cos_o, sin_o)
-        room[0, k] = steepness(way.cos_s, way.sin_s)
-        room[1, k] = share * tilted_density(b, cell[RISE_DPHI])
-        room[2, k] = 1.0 + hidden_i + hidden_s
+        numbers[OUT_RISE, k] = steepness(way.cos_s, way.sin_s)
+        numbers[OF_LOOK, k] = share * tilted_density(b, cell[RISE_DPHI])
+        numbers[OF_SMITH, k] = 1.0 + hidden_i + hidden_s
         k += 1
     most, reach = HIGHEST * unit, ensemble.reach
     px, py = ensemble.pitch_x, ensemble.pitch_y
     lift_clear(mesh, place, reach, rays, most, cos_phi / px, sin_phi / py)
     for k in range(rays.rise.size):
-        rays.rise[k] = room[0, k]
+        rays.rise[k] = numbers[OUT_RISE, k]
     lift_clear(mesh, place, reach, rays, most, cos_o / px, sin_o / py)
-    return unit, lowest
+    return place, across, unit, lowest
 
 
 @jit(forceinline=True)
@@ -197,34 +190,68 @@ def higher(lift, lowest, unit):
     return 1.0 - max(LOW_SHARE, 0.5 * erfc(-lift / (sqrt(2.0) * unit)))
 
 
+@jit(forceinline=True)
+def first_of(rays, n):
+    """Return the first n rays."""
+    return Rays(
+        rays.slope_x[:n], rays.slope_y[:n], rays.start[:n], rays.change_x[:n],
+        rays.change_y[:n], rays.rise[:n], rays.lift[:n],
+    )  # fmt: skip
+
+
 @jit(allocates=False)
-def look(mesh, ensemble, looks, rays, room, seen):
+def look(mesh, ensemble, looks, profiles, room, seen):
     """Fill in how often facets are seen in units of Smith's rule (cells, cells).
 
-    rays, room  as of `look_up`, as long as a column of cells
+    profiles    `Profiles` of the lines of looks without a surface
+    room        `LookRoom`
     """
     n_theta, n_dphi = seen.shape
-    number = 0
+    numbers, told = room.numbers, room.numbers[TOLD]
+    number = pair = 0
+    # So that on average a column has the places that it should, if only one in many samples
+    due, _ = uniform_pair(looks.stream, 0, 4)
     for column in range(n_dphi):
-        count = looks.places[column]
+        n = 0
         for row in range(n_theta):
             seen[row, column] = 1.0
-        n_rays = 0
-        for row in range(n_theta):
-            n_rays += looks.wanted[row, column]
-        if n_rays == 0:
+            n += looks.wanted[row, column]
+            told[row] = 0.0
+        if n == 0:
             continue
-        some = Rays(
-            rays.slope_x[:n_rays], rays.slope_y[:n_rays], rays.start[:n_rays],
-            rays.change_x[:n_rays], rays.change_y[:n_rays], rays.rise[:n_rays],
-            rays.lift[:n_rays],
-        )  # fmt: skip
-        for m in range(count):
-            unit, lowest = look_up(mesh, ensemble, looks, column, m, number, some, room)
+        pairs = looks.pairs[column]
+        if pairs > 0:
+            start, _ = uniform_pair(looks.stream, column, 5)
+            draw_looks(
+                ensemble, profiles, column, n, pairs, start,
+                looks.normals[pair : pair + pairs], room.drawn, told,
+            )  # fmt: skip
+            pair += pairs
+            add_rows(looks.wanted, column, told, 0.5 / pairs, seen)
+        some = first_of(room.rays, n)
+        before = floor(due)
+        due += looks.places[column]
+        for m in range(int(floor(due) - before)):
+            place, b, unit, lowest = look_up(
+                mesh, ensemble, looks, column, m, number, some, numbers
+            )
             number += 1
-            k = 0
-            for row in range(n_theta):
-                if looks.wanted[row, column]:
-                    surplus = room[2, k] * higher(some.lift[k], lowest, unit) - 1.0
-                    seen[row, column] += room[1, k] * surplus / count
-                    k += 1
+            for k in range(n):
+                surplus = numbers[OF_SMITH, k] * higher(some.lift[k], lowest, unit) - 1.0
+                told[k] = numbers[OF_LOOK, k] * surplus
+            if pairs > 0:
+                take_mesh_looks(
+                    mesh, ensemble, profiles, column, place, b, numbers[ACROSS], n,
+                    room.drawn, told,
+                )  # fmt: skip
+            add_rows(looks.wanted, column, told, 1.0 / looks.places[column], seen)
+
+
+@jit(forceinline=True)
+def add_rows(wanted, column, told, share, seen):
+    """Add what was told of the wanted cells of a column."""
+    k = 0
+    for row in range(wanted.shape[0]):
+        if wanted[row, column]:
+            seen[row, column] += share * told[k]
+            k += 1

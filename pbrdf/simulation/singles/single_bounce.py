@@ -24,18 +24,23 @@ from pbrdf.kernels.sights.light import (
     SlopeLaw,
     fill_light,
 )
-from pbrdf.kernels.sights.looks import N_OF_LOOK, Ensemble, Looks, look
+from pbrdf.kernels.sights.looks import N_OF_LOOK, Ensemble, LookRoom, Looks, look
+from pbrdf.kernels.sights.profiles import Profiles
 from pbrdf.kernels.sights.rules import rules_from
 from pbrdf.kernels.sights.walk import N_OF_RAY, Mesh, Rays
 from pbrdf.kernels.terrain.heightfield import Terrain
 from pbrdf.scene.scene import Scene
 from pbrdf.simulation.plan import Plan, Tally
 from pbrdf.simulation.singles.ensemble import facet_ensemble
+from pbrdf.simulation.singles.profiles import NO_PROFILES, profiles_of
 from pbrdf.simulation.spectra import WORTHWHILE
 from pbrdf.surface import GaussianSurface, Surface
 
-# Places with a facet for each azimuth's cells, to each ray of a realisation
-PLACES_PER_RAY = 0.02
+# Pairs of looks without a surface to each ray of a realisation, for each azimuth's cells,
+# and places with a facet on it that correct them; places without such pairs
+PAIRS_PER_RAY, PLACES_PER_RAY, PLACES_ALONE = 0.1, 0.005, 0.02
+# Places for a column of cells in the mean, at least
+FEWEST_PLACES = 0.25
 # Cells of directions are no wider than these parts of a quarter and of a full circle
 LEAST_THETA, LEAST_DPHI = 30, 60
 # Flux below which hiding changes nothing
@@ -85,17 +90,28 @@ class Direction:
         Flux of facets that reflect all, with and without hiding; see the kernel.
     wanted : ndarray of bool, shape (cells, cells)
         Whether a cell is looked at.
-    places : ndarray of int, shape (cells,)
-        Places a realisation for the cells of each dphi.
+    places : ndarray, shape (cells,)
+        Places a realisation for the cells of each dphi, in the mean.
+    pairs : ndarray of int, shape (cells,)
+        Pairs of looks a realisation without a surface, likewise.
     change : ndarray, shape (cells,)
         Logarithmic change of the flux of such cells across dphi.
+    profiles : Profiles
+        Lines of the looks without a surface.
     """
 
     light: np.ndarray
     cells: np.ndarray
     wanted: np.ndarray
     places: np.ndarray
+    pairs: np.ndarray
     change: np.ndarray
+    profiles: Profiles
+
+    @property
+    def looks(self) -> np.ndarray:
+        """Looks at the cells of each dphi (cells,)."""
+        return np.where(self.pairs > 0, 2.0 * self.pairs, self.places)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,7 +171,8 @@ class SingleBounce:
             for c in (surface.correlation(0), surface.correlation(1))
         )
         directions = tuple(
-            _direction(theta, ensemble.law, plan, parts) for theta in plan.theta_i
+            _direction(theta, surface, ensemble, (along_x, along_y), plan)
+            for theta in plan.theta_i
         )
         return cls(
             ensemble=ensemble, along_x=along_x, along_y=along_y, parts=parts,
@@ -200,7 +217,7 @@ class SingleBounce:
         places = []
         for one in self.directions:
             # Cells of one azimuth share their places: a bin sees as many as one row of it
-            seen = np.where(one.wanted, one.places, 0)
+            seen = np.where(one.wanted, one.looks, 0)
             rows = seen.reshape(-1, self.parts[0], seen.shape[1]).max(axis=1)
             places.append(rows.reshape(len(rows), -1, self.parts[1]).sum(axis=2))
         return np.array(places)
@@ -212,7 +229,7 @@ class SingleBounce:
                 "Rays and realisations: none. No facet hides another, and single bounces "
                 "are an integral."
             ]
-        looks = np.mean([(one.wanted * one.places).sum() for one in self.directions])
+        looks = np.mean([(one.wanted * one.looks).sum() for one in self.directions])
         return [
             "Single bounces: not from rays but from the law of the slopes, times the share "
             "of the facets that is seen in units of Smith's rule, from "
@@ -276,28 +293,56 @@ class SingleBounce:
         one = self.directions[angle]
         seen = np.ones(one.wanted.shape)
         if one.wanted.any():
+            nodes, rows = one.profiles.nodes.shape[1], len(one.wanted)
+            normals = np.random.default_rng(int(stream)).standard_normal(
+                (one.pairs.sum(), nodes)
+            )
             looks = Looks(
                 plan.theta_i[angle], plan.phi_i or 0.0, plan.phi_i is None,
-                -np.pi / plan.n_dphi, one.cells, one.wanted, one.places, one.change, stream,
+                -np.pi / plan.n_dphi, one.cells, one.wanted, one.places, one.pairs,
+                one.change, stream, normals,
             )  # fmt: skip
             mesh = Mesh(terrain, self.along_x, self.along_y)
-            room = np.empty((N_OF_RAY + N_OF_LOOK, len(one.wanted)))
-            rays = Rays(*room[:N_OF_RAY])
-            look(mesh, self.ensemble, looks, rays, room[N_OF_RAY:], seen)
+            room = LookRoom(
+                Rays(*np.empty((N_OF_RAY, rows))), np.empty((N_OF_LOOK, rows)),
+                (np.empty(nodes), np.empty(rows)),
+            )  # fmt: skip
+            look(mesh, self.ensemble, looks, one.profiles, room, seen)
         return seen
 
 
 def _direction(
-    theta: float, law: SlopeLaw, plan: Plan, parts: tuple[int, int]
+    theta: float,
+    surface: GaussianSurface,
+    ensemble: Ensemble,
+    along: tuple[np.ndarray, np.ndarray],
+    plan: Plan,
 ) -> Direction:
     few = len(plan.n) < WORTHWHILE
-    light, cells = _averaged(*_what(theta, law, plan, plan.n if few else plan.n[:0]))
-    wanted, places = _places(cells, plan.n_rays * PLACES_PER_RAY, parts)
+    what = _what(theta, ensemble.law, plan, plan.n if few else plan.n[:0])
+    light, cells = _averaged(*what)
+    wanted, shares = _shares(cells, cell_parts(plan))
     flux = np.where(wanted, cells[..., SEEN], 0.0)
     change = (flux * cells[..., RISE_DPHI]).sum(axis=0) / np.maximum(
         flux.sum(axis=0), 1e-300
     )
-    return Direction(light=light, cells=cells, wanted=wanted, places=places, change=change)
+    looked = wanted.any(axis=0)
+    alone = np.rint(shares * plan.n_rays * PLACES_ALONE)
+    places = np.where(looked, np.maximum(alone, 1.0), 0.0)
+    pairs, profiles = np.zeros(len(shares), dtype=np.int64), NO_PROFILES
+    if plan.phi_i is not None and looked.any():
+        number = np.rint(shares * plan.n_rays * PAIRS_PER_RAY).astype(np.int64)
+        pairs = np.where(looked, np.maximum(number, 1), 0)
+        fewer = np.maximum(shares * plan.n_rays * PLACES_PER_RAY, FEWEST_PLACES)
+        places = np.where(looked, fewer, 0.0)
+        profiles = profiles_of(
+            surface, ensemble, along, (float(theta), plan.phi_i), cells, wanted, change,
+            -np.pi / plan.n_dphi,
+        )  # fmt: skip
+    return Direction(
+        light=light, cells=cells, wanted=wanted, places=places, pairs=pairs, change=change,
+        profiles=profiles,
+    )  # fmt: skip
 
 
 def cell_parts(plan: Plan) -> tuple[int, int]:
@@ -359,10 +404,8 @@ def _averaged(
     return light, cells
 
 
-def _places(
-    cells: np.ndarray, number: float, parts: tuple[int, int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Cells to look at, and places by column, for like errors of all but dark bins."""
+def _shares(cells: np.ndarray, parts: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Cells to look at, and shares of looks by column for like errors of bright bins."""
     whole, seen = cells[..., ALL], cells[..., SEEN]
     share = np.divide(seen, whole, out=np.ones_like(seen), where=whole > 0.0)
     variance = (1.0 - share) / np.maximum(share, 1e-300)
@@ -378,5 +421,4 @@ def _places(
     dark = bright < DARKEST * bright.max()
     wanted &= ~np.repeat(np.repeat(dark, a, axis=0), b, axis=1)
     weight = np.sqrt((part**2 * variance * wanted).sum(axis=0))
-    places = np.rint(number * weight / max(weight.sum(), 1e-300)).astype(np.int64)
-    return wanted, np.where(wanted.any(axis=0), np.maximum(places, 1), 0)
+    return wanted, weight / max(weight.sum(), 1e-300)
