@@ -202,7 +202,7 @@ class _Exact:
             warnings.simplefilter("ignore", AccuracyWarning)
             surface = self.model.with_parameters(**heights).surface
             azimuth = np.tile(where.phi_i, len(kinds))
-            rows = surface.matrices(columns, retarded=self.retarded, phi_i=azimuth)
+            rows = surface.matrices(columns, dressed=self.retarded, phi_i=azimuth)
         rows = rows.reshape(len(kinds), where.size, 16)
         m00 = rows[0, :, 0] + _LEAST
         wanted = rows[min(1, len(kinds) - 1) :, :, list(self.elements)] / m00[:, None]

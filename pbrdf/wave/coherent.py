@@ -97,10 +97,15 @@ class MeanField:
         return whole * min(1.0, most / max(largest, 1e-300))
 
     @property
-    def retardance(self) -> float:
-        """Half the phase of s over p that the heights add, times the reflectance."""
-        phase = (self.second * self.flat.conj()).imag
-        return float(0.5 * (phase[0] - phase[1]))
+    def dressing(self) -> complex:
+        """Logarithm of what one way through the mean field leaves of E_s E_p*.
+
+        Half of what departs from the Kirchhoff factor, times the reflectance: the phase of
+        s over p, and what either loses. The other half is that of the way back.
+        """
+        s, p = 0.5 * self.departure * self.flat.conj()
+        # What one gains the other has not lost
+        return complex(min(s.real, 0.0) + min(p.real, 0.0), s.imag - p.imag)
 
 
 @dataclass(frozen=True)

@@ -301,7 +301,8 @@ class WaveModel:
     ) -> Array:
         """Relative standard error of M00 of `brdf`, judged on rigorous solutions.
 
-        Those are of profiles up to 0.8 wavelengths high, in plane. Arguments as in `brdf`.
+        68 % of their directions lie within it, 95 % within twice its value. They are of
+        profiles up to 0.8 wavelengths high, in plane. Arguments as in `brdf`.
         Of heights with two lengths the larger error of the isotropic surfaces of either.
 
         Returns
@@ -324,7 +325,8 @@ class WaveModel:
             Scattering(heights, name, 2).matrices(columns)[:, 0] for name in self._compared
         )
         slope = self.surface.slopes(columns[3])
-        return relative_error(found, best, orders, plane, slope).reshape(shape)
+        zenith = np.maximum(columns[0], columns[1])
+        return relative_error(found, best, orders, plane, slope, zenith).reshape(shape)
 
     def profile_error(
         self, theta_i: npt.ArrayLike, theta_view: npt.ArrayLike, wavelength: npt.ArrayLike
@@ -336,7 +338,8 @@ class WaveModel:
         )
         waves = np.broadcast_to(checked_wavelength(wavelength), found.shape[:-1])
         slope = self.profile.slopes(waves.ravel()).reshape(*waves.shape, 1)
-        return relative_error(found, best, orders, plane, slope)
+        zenith = np.maximum(*np.broadcast_arrays(theta_i, np.abs(theta_view), waves)[:2])
+        return relative_error(found, best, orders, plane, slope, zenith[..., None])
 
     @property
     def _compared(self) -> tuple[str, str, str, str]:

@@ -18,7 +18,7 @@ from pbrdf.kernels.wave.scatter import (
 from pbrdf.wave.directional import Directional, smith
 from pbrdf.wave.methods import method_of
 from pbrdf.wave.order_table import OrderTable
-from pbrdf.wave.specular import Retardance, mean_jones
+from pbrdf.wave.specular import Dressing, mean_jones
 from pbrdf.wave.statistics import Statistics
 
 __all__ = ["Scattering"]
@@ -50,10 +50,10 @@ class Scattering:
         self.heights, self.dimensions = heights, dimensions
         self.name, self.method = method, method_of(method)
         self._table: OrderTable | None = None
-        self._phases = Retardance(heights, dimensions)
+        self._dressing = Dressing(heights, dimensions)
 
     def matrices(
-        self, columns: list[Array], *, retarded: bool = True, phi_i: Array | float = 0.0
+        self, columns: list[Array], *, dressed: bool = True, phi_i: Array | float = 0.0
     ) -> Array:
         """Mueller matrices as rows of 16.
 
@@ -61,9 +61,9 @@ class Scattering:
         ----------
         columns : list of ndarray, each of N
             theta_i, theta_s, dphi [rad], wavelength [um], n, kappa.
-        retarded : bool
-            Whether s and p get the phase of the mean field, which takes most of the time
-            and changes only elements of U and V.
+        dressed : bool
+            Whether s and p get phase and loss of the mean field, which takes most of the
+            time and changes only elements of U and V.
         phi_i : ndarray of N, or float
             Azimuth of the source, where heights differ from direction to direction. [rad]
 
@@ -79,7 +79,7 @@ class Scattering:
         spreads = self._spreads(columns[3])
         self._check_facets(spreads, columns[3])
         self._warn_of_slopes(columns[3])
-        phases = self._retardance(columns) if retarded else np.zeros((2, size))
+        dressing = self._dressings(columns) if dressed else np.zeros((2, size), complex)
         moments = self._moments(2 * np.pi / columns[3].min())
         hidden = self.method.shadowed
         directional = isinstance(self.heights, Directional)
@@ -97,7 +97,7 @@ class Scattering:
             given = np.stack([k * height, spreads[part] / k, spreads[part] * height])
             fill_scattering(
                 np.stack(pieces[:3]), np.stack(pieces[4:]), given,
-                moments(k, rise, wave, given), np.ascontiguousarray(phases[:, part]),
+                moments(k, rise, wave, given), np.ascontiguousarray(dressing[:, part]),
                 plan, out[part],
             )  # fmt: skip
 
@@ -219,16 +219,16 @@ class Scattering:
             table.moments(rise * given[0], wave * k) * k**dimensions
         )
 
-    def _retardance(self, columns: list[Array]) -> Array:
-        """Phase of s over p that the mean field takes on its ways in and out, (2, N)."""
-        phases = np.zeros((2, columns[0].size))
+    def _dressings(self, columns: list[Array]) -> Array:
+        """Logarithms of what the ways in and out leave of E_s E_p*, (2, N)."""
+        found = np.zeros((2, columns[0].size), dtype=np.complex128)
         if self.name != "auto" or isinstance(self.heights, Directional):
-            return phases
+            return found
         for rows in each_wavelength(columns[3]):
             wave, n, kappa = (float(c[rows[0]]) for c in columns[3:])
             for side in (0, 1):
-                phases[side, rows] = self._phases.at(columns[side][rows], wave, n, kappa)
-        return phases
+                found[side, rows] = self._dressing.at(columns[side][rows], wave, n, kappa)
+        return found
 
 
 def each_wavelength(wavelength: Array) -> list[Array]:

@@ -12,11 +12,11 @@ from pbrdf.wave.coherent import MeanField, Medium, Waves, mean_field
 from pbrdf.wave.directional import Directional
 from pbrdf.wave.statistics import Exponential, Gaussian, Statistics
 
-__all__ = ["Retardance", "mean_jones", "mueller_of"]
+__all__ = ["Dressing", "mean_jones", "mueller_of"]
 
 Array = np.ndarray
 
-# Zeniths at which the phase of the mean field is found; it is smooth between them
+# Zeniths at which phase and loss of the mean field are found; both are smooth between them
 PHASE_ZENITHS = np.r_[np.linspace(0.0, 0.5 * np.pi, 19)[:-1], np.deg2rad(89.5)]
 # Heights that are told by height and length alone
 LAWS = {orders.GAUSSIAN: Gaussian, orders.EXPONENTIAL: Exponential}
@@ -127,8 +127,11 @@ def _kirchhoff(
     return fall * np.diag(np.ravel(fresnel_amplitudes(cosine, n, kappa)))
 
 
-class Retardance:
-    """Phase of s over p that the mean field takes on its way in and out.
+class Dressing:
+    """What the mean field does to E_s E_p* of light on its way in or out.
+
+    Light that the mean field loses beyond the Kirchhoff factor is scattered once more, by
+    waves of all directions: its power stays, and s and p of it have no common phase.
 
     Parameters
     ----------
@@ -143,35 +146,36 @@ class Retardance:
         self._known: dict[tuple[float, float, float], Array] = {}
 
     def at(self, zenith: Array, wavelength: float, n: float, kappa: float) -> Array:
-        """Phases at zeniths of light of one wavelength. [rad]"""
+        """Logarithms at zeniths of light of one wavelength, complex. [1]"""
         key = wavelength, n, kappa
         if key not in self._known:
             self._known[key] = self._tabulated(*key)
-        return np.interp(zenith, PHASE_ZENITHS, self._known[key])
+        found: Array = np.interp(zenith, PHASE_ZENITHS, self._known[key])
+        return found
 
     def _tabulated(self, wavelength: float, n: float, kappa: float) -> Array:
-        """Phases at `PHASE_ZENITHS`, which go with the square of the height."""
+        """Logarithms at `PHASE_ZENITHS`, which go with the square of the height."""
         k, heights = 2 * np.pi / wavelength, self._heights
         if heights.law in LAWS:
             length = k * heights.corr_length
-            unit = unit_retardances(heights.law, length, self._dimensions, n, kappa)
+            unit = unit_dressings(heights.law, length, self._dimensions, n, kappa)
             return (k * heights.height_rms) ** 2 * unit
         means = [
             _second_order(heights, self._dimensions, float(zenith), wavelength, n, kappa)
             for zenith in PHASE_ZENITHS
         ]
-        return np.array([mean.retardance for mean in means])
+        return np.array([mean.dressing for mean in means])
 
 
 @lru_cache(maxsize=4096)
-def unit_retardances(
+def unit_dressings(
     law: int, length: float, dimensions: int, n: float, kappa: float
 ) -> Array:
-    """Phases at `PHASE_ZENITHS` over (k h)², of heights of length k l."""
+    """Logarithms at `PHASE_ZENITHS` over (k h)², of heights of length k l."""
     heights = LAWS[law](1.0, length)
     # Of a wavelength at which k is 1
     means = (
         _second_order(heights, dimensions, float(zenith), 2 * np.pi, n, kappa)
         for zenith in PHASE_ZENITHS
     )
-    return np.array([mean.retardance for mean in means])
+    return np.array([mean.dressing for mean in means])

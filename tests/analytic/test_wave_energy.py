@@ -163,7 +163,7 @@ def test_faults_of_the_heights_are_named() -> None:
 
 @pytest.mark.filterwarnings("ignore:The rms slope")
 def test_the_stated_error_covers_the_true_one() -> None:
-    within, twice = [], []
+    within, twice, low = [], [], []
     for name, material in (("n1.5", Material(1.5)), ("pec", Material.mirror())):
         for (height, length, theta), group in wave_reference.table(name).groupby(
             wave_reference.CASE
@@ -182,5 +182,11 @@ def test_the_stated_error_covers_the_true_one() -> None:
                 limit = np.hypot(np.log1p(stated), noise)
                 within.append(off < limit)
                 twice.append(off < 2 * limit)
-    assert 0.7 < np.mean(np.concatenate(within)) < 0.95
-    assert np.mean(np.concatenate(twice)) > 0.94
+                low.append(np.abs(view[counted]) > np.deg2rad(70))
+    within, twice, low = (np.concatenate(part) for part in (within, twice, low))
+    # A standard error: no less than 68 and 95 %, and not by being far too large
+    assert 0.68 < within.mean() < 0.86
+    assert twice.mean() > 0.95
+    # Low rays err most: there it held 45 and 70 % before it knew of the slope
+    assert within[low].mean() > 0.64
+    assert twice[low].mean() > 0.9

@@ -32,8 +32,10 @@ def test_auto_agrees_with_rigorous_solutions(name) -> None:
     smooth = found[found.height_rms_per_wavelength == 0.02]
     assert smooth.s.max() < 0.08
     assert smooth.p.max() < (0.3 if name == "pec" else 0.08)
-    assert found.re.max() < 0.1
-    assert found.im.max() <= 0.1005
+    assert max(found.re.max(), found.im.max()) < 0.095
+    if name == "pec":
+        # Light that the mean field loses has no common phase of s and p: 0.083 without it
+        assert found.re.max() < 0.075
 
 
 @pytest.mark.slow

@@ -235,11 +235,20 @@ def shadowing(ray_in, ray_out, slope):
 
 
 @jit(forceinline=True)
-def write_matrix(sums, factor, retard_in, retard_out, out):
-    """Write the Mueller matrix of the sums, between two retarders of s against p."""
+def coherence(share, dressing):
+    """Return what is left of E_s E_p*, by the logarithm of what one way leaves."""
+    size = exp(share * dressing.real)
+    turn = share * dressing.imag
+    return complex(size * np.cos(turn), size * np.sin(turn))
+
+
+@jit(forceinline=True)
+def write_matrix(sums, factor, into, away, out):
+    """Write the Mueller matrix of the sums.
+
+    On the ways in and out E_s E_p* is multiplied by `into` and `away`, at most 1.
+    """
     ss, sp, ps, pp, ss_sp, ps_pp, ss_ps, sp_pp, ss_pp, sp_ps = sums
-    into = complex(np.cos(retard_in), np.sin(retard_in))
-    away = complex(np.cos(retard_out), np.sin(retard_out))
     ss_sp, ps_pp = ss_sp * into, ps_pp * into
     ss_ps, sp_pp = ss_ps * away, sp_pp * away
     ss_pp, sp_ps = ss_pp * into * away, sp_ps * away * into.conjugate()
@@ -263,7 +272,7 @@ def write_matrix(sums, factor, retard_in, retard_out, out):
 
 
 @jit
-def fill_scattering(angles, indices, statistics, moments, retardance, plan, out):
+def fill_scattering(angles, indices, statistics, moments, dressing, plan, out):
     """Fill the rows of `out` with Mueller matrices, 16 elements each.
 
     Parameters
@@ -276,8 +285,8 @@ def fill_scattering(angles, indices, statistics, moments, retardance, plan, out)
         k h; rms wave vector of the heights per axis over k; rms slope.
     moments : (5, N)
         Of n^2, n, 1, 1/n, 1/n^2.
-    retardance : (2, N)
-        Phase of s over p that the mean field takes on its way in and out.
+    dressing : (2, N)
+        Logarithm of what the mean field leaves of E_s E_p* on its way in and out, complex.
     out : (N, 16)
         1/sr; of a profile, power per radian over incident power.
     """
@@ -302,5 +311,5 @@ def fill_scattering(angles, indices, statistics, moments, retardance, plan, out)
             factor *= shadowing(ray_in, ray_out, surface.slope)
         # Of an order n of scattering one step in n is the mean field's; as an amplitude
         share = sqrt(five[3] / five[2]) if five[2] > 0.0 else 0.0
-        into, away = share * retardance[0, k], share * retardance[1, k]
+        into, away = coherence(share, dressing[0, k]), coherence(share, dressing[1, k])
         write_matrix(sums, factor, into, away, out[k])
