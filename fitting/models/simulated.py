@@ -225,7 +225,8 @@ class SimulatedModel:
         """Return what was simulated at these incidences, for the index of the start."""
         import xarray as xr
 
-        keys = [self._run.key(angle, phi_i) for angle in theta_i]
+        angles = list(theta_i)
+        keys = self._run.keys(angles, [phi_i] * len(angles))
         self._run.of(keys)
         parts = [self._run.datasets[key] for key in keys]
         return xr.concat(parts, "theta_i", data_vars="minimal", combine_attrs="override")
@@ -271,8 +272,9 @@ class SimulatedModel:
         their noise near the zenith, where they are small. What comes by several bounces is
         read at each ray, for its frame is that of the ray.
         """
-        angles = (geometry.axis(name).tolist() for name in ("theta_i", "phi_i"))
-        keys = [self._run.key(*pair) for pair in zip(*angles, strict=True)]
+        keys = self._run.keys(
+            *(geometry.axis(name).tolist() for name in ("theta_i", "phi_i"))
+        )
         axis_s, axis_dphi = geometry.axis("theta_s"), geometry.axis("dphi")
         ratio = np.empty(geometry.size)
         multiple = np.empty((geometry.size, 16, len(self._run.grid.nodes)))

@@ -34,10 +34,12 @@ class Run:
     traces: dict[Key, Trace] = field(default_factory=dict)
     datasets: "dict[Key, xr.Dataset]" = field(default_factory=dict)
 
-    def key(self, theta_i: float, phi_i: float) -> Key:
+    def keys(self, theta_i: Sequence[float], phi_i: Sequence[float]) -> list[Key]:
         """Return what tells source directions apart on this surface."""
-        isotropic = getattr(self.scene.surface, "isotropic", False)
-        return round(theta_i, 9), None if isotropic else round(phi_i, 9)
+        if getattr(self.scene.surface, "isotropic", False):
+            return [(round(theta, 9), None) for theta in theta_i]
+        both = zip(theta_i, phi_i, strict=True)
+        return [(round(theta, 9), round(phi, 9)) for theta, phi in both]
 
     def of(self, keys: Sequence[Key]) -> list[Trace]:
         """Return the traces of these source directions; run what is missing."""

@@ -405,6 +405,7 @@ def test_comparison_prefers_the_true_model():
     assert_allclose(sum(row.weight for row in rows.values()), 1.0)
 
 
+@pytest.mark.slow
 def test_f_test_rejects_a_true_model_as_often_as_it_says():
     p_values = []
     for seed in range(60):
