@@ -1,5 +1,7 @@
 """What a flat surface answers to a source of some width, from directions drawn here."""
 
+from functools import cache
+
 import numpy as np
 
 
@@ -50,6 +52,7 @@ def carried(axis, s, to):
     )
 
 
+@cache
 def mirrored_disc(theta, phi, half, matrix_of, n_theta, n_dphi, count=400_000):
     """Flux (n_theta, n_dphi, 4, 4) of a disc in a flat surface, and directions drawn.
 
@@ -72,6 +75,7 @@ def mirrored_disc(theta, phi, half, matrix_of, n_theta, n_dphi, count=400_000):
     j = np.floor(dphi / (2 * np.pi) * n_dphi + 0.5).astype(int) % n_dphi
     flux = np.zeros((n_theta, n_dphi, 4, 4))
     np.add.at(flux, (i, j), mueller / len(out))
+    flux.setflags(write=False)
     return flux, len(out)
 
 

@@ -37,6 +37,10 @@ def film_table():
     return np.array([film_matrix(np.arccos(c), WATER.n, ALUMINIUM) for c in cosines])
 
 
+def film_matrices(cosine):
+    return film_table()[np.rint((cosine - 0.6) / 0.4 * 2000).astype(int)]
+
+
 @pytest.mark.parametrize("level", [False, True])
 @pytest.mark.parametrize(("theta", "phi"), [(SOURCE, 0.7), (0.02, -2.0)])
 def test_a_flat_film_on_metal_mirrors_the_disc_with_its_frames(theta, phi, level):
@@ -48,10 +52,7 @@ def test_a_flat_film_on_metal_mirrors_the_disc_with_its_frames(theta, phi, level
         phi_i=phi, n_rays=120_000, source_half_angle=half, n_theta=n_theta, n_dphi=n_dphi,
     )  # fmt: skip
 
-    def matrices(cosine):
-        return film_table()[np.rint((cosine - 0.6) / 0.4 * 2000).astype(int)]
-
-    expected, drawn = mirrored_disc(theta, phi, half, matrices, n_theta, n_dphi)
+    expected, drawn = mirrored_disc(theta, phi, half, film_matrices, n_theta, n_dphi)
     assert np.abs(expected[..., 2:, :2]).max() > 1e-4
     assert_answers_disc(result, expected, drawn)
     clean_counters(result)

@@ -48,12 +48,12 @@ def scan_of(surface: HeightMap) -> xr.Dataset:
         n_dphi=36, stokes="unpolarized", seed=11, variance_reduction=False,
     )  # fmt: skip
     m00 = 0.5 * run.brdf_total.values[..., 0, 0] + 0.02 / np.pi
-    axes = (THETA_I, run.theta_s.values[:24], run.dphi.values[::3])
+    axes = (THETA_I, run.theta_s.values[:24], run.dphi.values[::6])
     theta_i, theta_s, dphi = (a.ravel() for a in np.meshgrid(*axes, indexing="ij"))
     coords = {"theta_i": theta_i, "theta_s": theta_s, "dphi": dphi}
     coords["wavelength"] = np.full(theta_i.size, 0.65)
     return xr.Dataset(
-        {"M00": ("geometry", m00[:, :24, ::3].ravel())},
+        {"M00": ("geometry", m00[:, :24, ::6].ravel())},
         coords={name: ("geometry", values) for name, values in coords.items()},
     )
 

@@ -48,8 +48,13 @@ def main_values(found):
 
 @pytest.mark.parametrize(
     ("spacing", "noise", "step"),
-    [(1.0, 0.0, 0.0), (1.0, 0.5, 0.0), (0.5, 0.0, 0.5), (2.0, 0.0, 2.0), (1.0, 0.3, 1.0)],
-    ids=["clean", "noise", "half-micron pixels", "two-micron pixels", "noise and pixels"],
+    [
+        pytest.param(1.0, 0.0, 0.0, id="clean"),
+        pytest.param(1.0, 0.5, 0.0, id="noise", marks=pytest.mark.slow),
+        pytest.param(0.5, 0.0, 0.5, id="half-micron pixels", marks=pytest.mark.slow),
+        pytest.param(2.0, 0.0, 2.0, id="two-micron pixels"),
+        pytest.param(1.0, 0.3, 1.0, id="noise and pixels"),
+    ],
 )
 def test_truth_is_recovered_whatever_the_instrument(spacing, noise, step):
     """40 profiles of 50 correlation lengths.

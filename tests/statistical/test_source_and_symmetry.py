@@ -15,6 +15,21 @@ ROUGH = GaussianSurface(shape=(96, 80), spacing=1.0, corr_length=8.0, slope_rms=
 SOURCE = np.deg2rad(40.0)
 
 
+def aluminium_facet(cosine):
+    """Matrices of a facet at these cosines of incidence, written out once more."""
+    index = 0.958 + 6.69j
+    q = np.sqrt(index**2 - 1 + cosine**2)
+    r_s = (cosine - q) / (cosine + q)
+    r_p = (index**2 * cosine - q) / (index**2 * cosine + q)
+    matrix = np.zeros((len(cosine), 4, 4))
+    matrix[:, 0, 0] = matrix[:, 1, 1] = (abs(r_s) ** 2 + abs(r_p) ** 2) / 2
+    matrix[:, 0, 1] = matrix[:, 1, 0] = (abs(r_s) ** 2 - abs(r_p) ** 2) / 2
+    matrix[:, 2, 2] = matrix[:, 3, 3] = (r_s * r_p.conj()).real
+    matrix[:, 2, 3] = -(r_s * r_p.conj()).imag
+    matrix[:, 3, 2] = (r_s * r_p.conj()).imag
+    return matrix
+
+
 @pytest.mark.parametrize("skips", [True, ("walk",), False])
 @pytest.mark.parametrize(("theta", "phi"), [(SOURCE, 0.7), (0.02, -2.0)])
 def test_flat_metal_mirrors_the_disc_with_its_frames(theta, phi, skips):
@@ -24,21 +39,7 @@ def test_flat_metal_mirrors_the_disc_with_its_frames(theta, phi, skips):
         Scene(FLAT, ALUMINIUM), theta, phi_i=phi, n_rays=120_000, source_half_angle=half,
         n_theta=n_theta, n_dphi=n_dphi, skips=skips,
     )  # fmt: skip
-    index = 0.958 + 6.69j
-
-    def facet(cosine):
-        q = np.sqrt(index**2 - 1 + cosine**2)
-        r_s = (cosine - q) / (cosine + q)
-        r_p = (index**2 * cosine - q) / (index**2 * cosine + q)
-        matrix = np.zeros((len(cosine), 4, 4))
-        matrix[:, 0, 0] = matrix[:, 1, 1] = (abs(r_s) ** 2 + abs(r_p) ** 2) / 2
-        matrix[:, 0, 1] = matrix[:, 1, 0] = (abs(r_s) ** 2 - abs(r_p) ** 2) / 2
-        matrix[:, 2, 2] = matrix[:, 3, 3] = (r_s * r_p.conj()).real
-        matrix[:, 2, 3] = -(r_s * r_p.conj()).imag
-        matrix[:, 3, 2] = (r_s * r_p.conj()).imag
-        return matrix
-
-    expected, drawn = mirrored_disc(theta, phi, half, facet, n_theta, n_dphi)
+    expected, drawn = mirrored_disc(theta, phi, half, aluminium_facet, n_theta, n_dphi)
     assert np.abs(expected[..., 1:, 1:]).max() > 0.02
     assert_answers_disc(result, expected, drawn)
 
