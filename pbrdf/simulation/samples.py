@@ -169,8 +169,14 @@ def _trace_clean(
         tallies[-1].leave_out(one.serves())
     terrain = None
     if target is not None and not all(one.everything for one in single):
-        rays = zip(plans, tallies, strict=True)
-        tallies = [trace_sample(target, plan, seeds[0], tally) for plan, tally in rays]
+        tallies = [
+            trace_sample(
+                target, plan, seeds[0], tally,
+                # A Gaussian surface turned by half a circle is another one
+                both_ways=isinstance(one, SingleBounce) and plan.phi_i is not None,
+            )
+            for plan, one, tally in zip(plans, single, tallies, strict=True)
+        ]  # fmt: skip
         terrain = (target if isinstance(target, Field) else target.field).terrain
     for plan, one, tally in zip(plans, single, tallies, strict=True):
         one.add(terrain, plan, seeds[1], tally)

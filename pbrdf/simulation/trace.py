@@ -1,6 +1,7 @@
 """Trace one surface sample: clean, by the exact walk or by Embree, or contaminated."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -58,12 +59,16 @@ def trace_sample(
     plan: Plan,
     seed: np.random.SeedSequence,
     room: Tally | None = None,
+    *,
+    both_ways: bool = False,
 ) -> Tally:
     """Trace every incident direction of the plan over one surface.
 
-    `room` is an empty tally to write into; without it one is made. Releases the interpreter
-    lock. The streams belong to the sample and the entry points to the stream, so that
-    neither the number of threads nor the intersector changes the rays.
+    `room` is an empty tally to write into; without it one is made. `both_ways` lets half of
+    the rays come from the opposite azimuth, over a field that is as likely as the same one
+    turned by half a circle: it has two samples of further bounces for one. Releases the
+    interpreter lock. The streams belong to the sample and the entry points to the stream,
+    so that neither the number of threads nor the intersector changes the rays.
     """
     tally = Tally.empty(plan) if room is None else room
     if isinstance(target, WetField | WetMesh):
@@ -86,8 +91,8 @@ def trace_sample(
                 _room(plan, NO_MEETINGS), bins,
             )  # fmt: skip
             continue
-        longest = -(-source.n_rays // source.n_lines)
         if isinstance(field, MeshField):
+            longest = -(-source.n_rays // source.n_lines)
             met, told = np.empty((longest, N_MET)), np.empty(longest, dtype=np.int64)
             trace_mesh_batch(
                 field.facets(), source, MeshLine(met, told), record, waiting, light,
@@ -99,25 +104,41 @@ def trace_sample(
         # One pass along each line of entry points finds all first facets
         walks = not isinstance(target, EmbreeField)
         sweeps = walks and field.periodic and "sweep" in plan.skips
-        swept = longest if sweeps else 0
-        line = LineRoom(
-            np.empty((swept, N_FIRST)), np.empty((2, swept)), np.empty(swept * N_MIRRORED)
-        )
         if isinstance(target, WetField):
+            line = _line_room([source] if sweeps else [])
             trace_among_bodies(
                 target.world, source, field.terrain.z_top, plan.max_bounces,
                 plan.n_stokes, _room(plan, line.meetings), bins,
             )  # fmt: skip
             continue
+        sources = halves(field, source) if both_ways else [source]
         sink = (record, waiting, light, plan.optics, bins)
-        if sweeps:
-            sweep_batch(field.terrain, source, line, *sink)
-        else:
-            tree = target.tree() if isinstance(target, EmbreeField) else None
-            trace_batch(field.terrain, tree, source, *sink)
+        _trace_field(target, field, sources, sink, sweeps=sweeps)
         if tally.spectra:
             close_sums(light, plan.n_stokes, bins.lit)
     return tally
+
+
+def _trace_field(
+    target: Target, field: Field, sources: list[Source], sink: tuple[Any, ...], *,
+    sweeps: bool,
+) -> None:  # fmt: skip
+    """Trace the rays of sources over a clean height field."""
+    line = _line_room(sources if sweeps else [])
+    tree = target.tree() if isinstance(target, EmbreeField) else None
+    for source in sources:
+        if sweeps:
+            sweep_batch(field.terrain, source, line, *sink)
+        else:
+            trace_batch(field.terrain, tree, source, *sink)
+
+
+def _line_room(sources: list[Source]) -> LineRoom:
+    """Room for the longest line of any source."""
+    longest = max((-(-one.n_rays // one.n_lines) for one in sources), default=0)
+    return LineRoom(
+        np.empty((longest, N_FIRST)), np.empty((2, longest)), np.empty(longest * N_MIRRORED)
+    )
 
 
 def drawn(plan: Plan, seed: np.random.SeedSequence) -> tuple[np.ndarray, np.ndarray]:
@@ -146,6 +167,19 @@ def source_of(
         launch, field.entry_lines(launch, plan.n_rays, plan.half_angle), plan.n_rays,
         shifts[index], streams[index], np.sin(plan.half_angle),
     )  # fmt: skip
+
+
+def halves(field: Field, source: Source) -> list[Source]:
+    """Rays of a source at a known azimuth, half of them from the opposite one."""
+    number = source.n_rays
+    counts = [one for one in (number - number // 2, number // 2) if one > 0]
+    return [
+        source._replace(
+            n_rays=count, n_lines=field.entry_lines(source.launch, count),
+            phi=source.phi + k * np.pi,
+        )
+        for k, count in enumerate(counts)
+    ]  # fmt: skip
 
 
 def _room(plan: Plan, meetings: np.ndarray) -> Room:

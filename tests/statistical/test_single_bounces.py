@@ -10,12 +10,18 @@ from tests.statistical.estimators import hold_together
 GOLD_LIKE = Material(0.958, 6.69)
 # Facets are a sixth of the correlation length wide: what depends on the mesh is seen
 SURFACE = GaussianSurface(shape=(72, 72), spacing=1.0, corr_length=6.0, slope_rms=0.4)
+# A quarter of a turn makes another surface of this one, half a turn does not
+UNEQUAL = GaussianSurface(
+    shape=(96, 72), spacing=1.0, corr_length=(9.0, 5.0), slope_rms=0.4
+)
 BINS = {"n_theta": 6, "n_dphi": 8}
 
 
-@pytest.mark.parametrize("phi_i", [0.6, "uniform"])
-def test_all_elements_of_all_bounces_agree_with_rays(phi_i):
-    scene, theta_i = Scene(SURFACE, GOLD_LIKE), np.deg2rad([20.0, 65.0])
+@pytest.mark.parametrize(
+    ("surface", "phi_i"), [(SURFACE, 0.6), (SURFACE, "uniform"), (UNEQUAL, 0.2)]
+)
+def test_all_elements_of_all_bounces_agree_with_rays(surface, phi_i):
+    scene, theta_i = Scene(surface, GOLD_LIKE), np.deg2rad([20.0, 65.0])
     reduced = simulate(
         scene, theta_i, phi_i=phi_i, n_rays=1000, realizations=64, seed=1, **BINS
     )
