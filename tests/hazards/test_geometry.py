@@ -36,6 +36,8 @@ def trace(surface, **options):
         "n_theta": 9,
         "n_dphi": 12,
         "stokes": "unpolarized",
+        # Rays are counted, which facets would stand in for
+        "variance_reduction": False,
     } | options
     return simulate(Scene(surface, Material.mirror()), ANGLES, **options)
 
