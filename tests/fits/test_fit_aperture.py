@@ -108,15 +108,18 @@ def test_few_points_have_the_moments_of_two_discs(source, detector, level, allow
     [(0.003, 1.0), (0.003, 2.0), (0.005, 0.25), (0.01, 2.0), (0.03, 1.0)],
 )
 def test_a_lobe_narrower_than_the_detector_gives_its_slope(slope, half_angle):
-    half = np.deg2rad(half_angle)
-    measurement = wide_scan(narrow(slope), 0.0, half, power=15)
-    noise = Noise(relative=0.01)
-    result = fit(measurement, START, free=FREE, noise=noise)
+    measurement = wide_scan(narrow(slope), 0.0, np.deg2rad(half_angle), power=15)
+    result = fit(measurement, START, free=FREE, noise=Noise(relative=0.01))
     miss = result.values["slope_rms"] - slope
     assert abs(miss) < 0.01 * slope
     assert abs(miss) < result.stderr["slope_rms"]
     assert not any("cones of light" in w for w in result.warnings)
-    # The argument goes before the file
+
+
+def test_the_cone_of_the_argument_goes_before_that_of_the_file():
+    half, noise = np.deg2rad(2.0), Noise(relative=0.01)
+    measurement = wide_scan(narrow(0.01), 0.0, half, power=15)
+    result = fit(measurement, START, free=FREE, noise=noise)
     point = fit(measurement, START, free=FREE, noise=noise, aperture=Aperture())
     assert point.values["slope_rms"] > result.values["slope_rms"]
     again = fit(measurement.drop_vars(["source_half_angle", "detector_half_angle"]), START,
