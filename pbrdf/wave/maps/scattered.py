@@ -7,17 +7,21 @@ import xarray as xr
 from pbrdf.analytic.geometry import checked_zenith
 from pbrdf.conventions import RESULT_VARIABLES, STOKES, detector_bins
 from pbrdf.errors import require
-from pbrdf.kernels.wave.modes import fill_tangent_plane
+from pbrdf.kernels.wave.modes import fill_modes
 from pbrdf.optics import library
 from pbrdf.optics.fresnel import specular_mueller
 from pbrdf.optics.materials import Material
 from pbrdf.surface import HeightMap
+from pbrdf.wave.directional import smith
+from pbrdf.wave.maps.fields import Relief, phase_orders
 from pbrdf.wave.specular import mueller_of
 
 __all__ = ["map_scattering"]
 
 Array = np.ndarray
 
+# Forms that need no more than the field on the map
+METHODS = ("order-weighted", "kirchhoff")
 # Largest error of a phase q h from waves of one ring sharing q [rad]
 PHASE_STEP = 0.1
 FEWEST_RINGS = 24
@@ -35,11 +39,13 @@ def map_scattering(
     phi_i: float = 0.0,
     n_theta: int = 45,
     n_dphi: int = 90,
+    method: str = "order-weighted",
 ) -> xr.Dataset:
-    """Mueller BRDF of one map by the Kirchhoff integral, averaged over bins.
+    """Mueller BRDF of one map, wave by wave, averaged over bins.
 
-    A transform of exp(-iqh) for each ring of exit angles gives the waves that leave the
-    map; each carries its power into a bin of the detector.
+    Transforms of exp(-iqh), and of its orders divided by their number, for each ring of
+    exit angles give the waves that leave the map; each carries its power into a bin of the
+    detector.
 
     Parameters
     ----------
@@ -53,6 +59,10 @@ def map_scattering(
         Vacuum wavelength. [um]
     n_theta, n_dphi : int
         Bins as in `simulate`.
+    method : str
+        "order-weighted": order n of the heights has one n-th of the way from tangent plane
+        to first order, and Smith's factor of the slopes of the map; "kirchhoff": tangent
+        plane without shadowing.
 
     Returns
     -------
@@ -65,9 +75,12 @@ def map_scattering(
 
     Notes
     -----
-    Tangent plane and single scattering, without shadowing: for maps of gentle slopes whose
-    correlation length exceeds the wavelength.
+    Single scattering. Heights need not be Gaussian for the tangent plane; the change
+    towards first order takes the powers of the heights less their contractions with the rms
+    height of the map, as suits smooth maps and Gaussian ones. The beam, `coherent`, is that
+    of the mean phase.
     """
+    _check_method(method)
     angle = float(checked_zenith("theta_i", theta_i))
     wave = one_positive("wavelength", wavelength)
     substance = material if isinstance(material, Material) else library.get(material)
@@ -79,9 +92,12 @@ def map_scattering(
             f"{steps.max():.4g} um. Interpolate the map, or take a longer wavelength."
         )
         raise ValueError(msg)
-    heights = np.asarray(height_map.heights, dtype=np.float64)
-    heights = heights - heights.mean()
-    fade = _fade(heights.shape, height_map.periodic)
+    relief = Relief(
+        np.asarray(height_map.heights, dtype=np.float64),
+        steps,
+        periodic=height_map.periodic,
+    )
+    heights = relief.heights
     k = 2 * np.pi / wave
     # Lateral wave vectors over k of the waves that leave: k_s = k_i + K
     travel = np.array([np.cos(phi_i + np.pi), np.sin(phi_i + np.pi)])
@@ -98,18 +114,21 @@ def map_scattering(
         np.broadcast_to(east, cosine2.shape)[tuple(leaving.T)],
         np.broadcast_to(north, cosine2.shape)[tuple(leaving.T)],
     ])  # fmt: skip
-    power, mean = _powers(heights, fade, leaving, cosine, np.cos(angle), k)
-
     # In the frame of the incident wave
     turned = np.stack([
         travel[0] * lateral[0] + travel[1] * lateral[1],
         travel[0] * lateral[1] - travel[1] * lateral[0],
     ])  # fmt: skip
-    jones = np.empty((cosine.size, 4), dtype=np.complex128)
-    fill_tangent_plane(angle, turned, n, kappa, jones)
+    plane, first = np.empty((2, cosine.size, 4), dtype=np.complex128)
+    fill_modes(angle, turned, n, kappa, plane, first)
+    weighted = method == "order-weighted"
+    whole, parts, mean = _amplitudes(relief, leaving, cosine, np.cos(angle), k, weighted)
+    jones = plane * whole[:, None]
     # Efficiency (cos_s/cos_i) |2 cos_i b T/q|^2 with b = jones/(cos_s cos_i)
-    rise = cosine + np.cos(angle)
-    factor = 4.0 * power / (rise**2 * cosine * np.cos(angle))
+    factor = 4.0 / (cosine * np.cos(angle))
+    if weighted:
+        jones += (first - plane) * parts[:, None]
+        factor *= _seen(relief.gradients(2 * k), angle, cosine, turned, travel)
     matrices = mueller_of(jones.reshape(-1, 2, 2)) * factor[:, None, None]
     # Each wave stands for (wavelength/side)^2 of projected solid angle
     matrices /= wave**2 / (heights.size * steps[0] * steps[1])
@@ -117,6 +136,7 @@ def map_scattering(
     result = _binned(matrices, turned, cosine, kinship, (n_theta, n_dphi))
     beam = mean * specular_mueller(np.cos(angle), n, kappa)
     result["coherent"] = (("stokes_out", "stokes_in"), beam)
+    result.attrs["wave"] = method
     for name in ("brdf", "brdf_stderr", "coherent"):
         entry = RESULT_VARIABLES[name]
         result[name].attrs = {"units": entry.units, "long_name": entry.long_name}
@@ -128,38 +148,65 @@ def one_positive(name: str, value: float) -> float:
     return float(require(name, value, lambda v: v > 0, "be one positive number [um]", ""))
 
 
-def _fade(shape: tuple[int, ...], periodic: bool) -> Array:
-    """Weights of the map: Hann's window unless it is periodic; mean square 1."""
-    if periodic:
-        return np.ones(shape)
-    axes = [np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2 for n in shape]
-    window = np.outer(*axes)
-    return window / np.sqrt(np.mean(window**2))
+def _check_method(method: str) -> None:
+    """Refuse a form that needs statistics."""
+    if method not in METHODS:
+        msg = (
+            f"method must be one of {', '.join(METHODS)} for a map, got {method!r}. The "
+            "others need statistics: WaveModel has them."
+        )
+        raise ValueError(msg)
 
 
-def _powers(
-    heights: Array, fade: Array, leaving: Array, cosine: Array, cos_i: float, k: float
-) -> tuple[Array, float]:
-    """|T|^2 of every wave that leaves, the mean taken out, and that of the specular beam.
+def _amplitudes(
+    relief: Relief, leaving: Array, cosine: Array, cos_i: float, k: float, weighted: bool
+) -> tuple[Array, Array, float]:
+    """Transform the map for every wave that leaves, means taken out.
 
-    T is the transform of exp(-iqh) over the area. Waves are taken together in rings of
-    nearly one q.
+    The phase exp(-iqh) over q/k, and where `weighted` its orders over their number and q/k;
+    third comes the power of the mean phase in the specular beam. Waves go together in rings
+    of nearly one q, which so cancels for small heights.
     """
+    heights, fade, total = relief.heights, relief.fade, relief.fade.sum()
 
-    def phases(cos_s: float) -> tuple[Array, complex]:
-        field = np.exp(-1j * k * (cos_s + cos_i) * heights)
-        return field, complex((field * fade).sum() / fade.sum())
+    def transform(field: Array, rows: Array) -> Array:
+        mean = (field * fade).sum() / total
+        spectrum = scipy.fft.fft2((field - mean) * fade, workers=1) / heights.size
+        return np.asarray(spectrum[tuple(leaving[rows].T)])
 
     largest = k * np.abs(heights).max()
     rings = max(int(np.ceil(largest / (2 * PHASE_STEP))), FEWEST_RINGS)
     which = np.minimum((cosine * rings).astype(int), rings - 1)
-    power = np.empty(cosine.size)
+    whole, parts = np.zeros((2, cosine.size), dtype=np.complex128)
     for ring in np.unique(which):
         rows = which == ring
-        field, mean = phases(float(cosine[rows].mean()))
-        spectrum = scipy.fft.fft2((field - mean) * fade, workers=1) / heights.size
-        power[rows] = np.abs(spectrum[tuple(leaving[rows].T)]) ** 2
-    return power, abs(phases(cos_i)[1]) ** 2
+        rise = float(cosine[rows].mean()) + cos_i
+        if not weighted:
+            whole[rows] = transform(np.exp(-1j * k * rise * heights), rows) / rise
+            continue
+        field, orders = phase_orders(heights, k * rise, relief.height_rms)
+        whole[rows], parts[rows] = (transform(f, rows) / rise for f in (field, orders))
+    specular = (np.exp(-2j * k * cos_i * heights) * fade).sum() / total
+    return whole, parts, abs(specular) ** 2
+
+
+def _seen(
+    slopes: Array, theta_i: float, cosine: Array, turned: Array, travel: Array
+) -> Array:
+    """Smith's factor of every wave, with the slopes of the map along its azimuth."""
+    theta_s = np.arccos(np.clip(cosine, 0.0, 1.0))
+    turn = np.arctan2(turned[1], turned[0])
+    azimuth = turn + np.arctan2(travel[1], travel[0])
+
+    def along(angle: Array | float) -> Array:
+        x, y = np.cos(angle), np.sin(angle)
+        square = slopes[0, 0] * x * x + 2 * slopes[0, 1] * x * y + slopes[1, 1] * y * y
+        return np.sqrt(np.maximum(square, 0.0))
+
+    slope_i = along(float(np.arctan2(travel[1], travel[0])))
+    full = np.full(theta_s.size, theta_i)
+    # The source lies where the light comes from
+    return smith(full, theta_s, turn + np.pi, slope_i, along(azimuth))
 
 
 def _binned(
