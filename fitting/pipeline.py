@@ -5,7 +5,7 @@ the Monte Carlo; the scan gives the gains of both curves. The uncertainty of the
 slope goes into every fitted number.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from fitting.checks.unread import what_hangs_together, what_is_not_read
 from fitting.models.cuts import plane_curves
 from fitting.models.simulated import SimulatedModel
 from fitting.prediction.beside_gaussian import MeasuredSlopes, measured_slopes
+from fitting.prediction.beside_waves import WaveFit, wave_fit
 from fitting.quick import GAINS, Clock, Progress, QuickResult, first_look
 from fitting.readings.observations import Mask
 from fitting.readings.wavelengths import one_wavelength
@@ -63,6 +64,8 @@ class PipelineResult(QuickResult):
     measured_slopes : MeasuredSlopes or None
         Of a map: its own slope distribution beside the Gaussian, and the Monte Carlo over
         the map itself.
+    waves : WaveFit or None
+        The same heights by wave optics, where they matter at the wavelength of the scan.
     """
 
     monte_carlo: FitResult
@@ -70,6 +73,7 @@ class PipelineResult(QuickResult):
     simulation: xr.Dataset
     unknown: tuple[str, ...]
     measured_slopes: MeasuredSlopes | None = None
+    waves: WaveFit | None = None
 
     @property
     def model(self) -> MicrofacetModel:
@@ -162,17 +166,16 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
     scan_slope = None
     if "slope_rms" not in free:
         with clock.stage("slope of the scan"):
-            wider = (*free, "slope_rms")
-            scan_slope = bring(measurement, curve, free=wider)
-            if abs(scan_slope.values["slope_rms"] / statistics.slope_rms.value - 1.0) > FAR:
-                curve = simulated(scan_slope.model.model)
-                scan_slope = bring(measurement, curve, free=wider)
+            wanted = partial(bring, measurement, free=(*free, "slope_rms"))
+            scan_slope = _with_slope(wanted, curve, simulated, statistics)
 
     with clock.stage("slopes as measured"):
         own = _own_slopes(
             look.surface, analytic, simulation, statistics.slope_rms.value,
             n_rays=n_rays * max(realizations // _SHARE, 1), seed=seed, workers=workers,
         )  # fmt: skip
+    with clock.stage("waves"):
+        waves = wave_fit(statistics, measurement, bring, material=material, free=free)
 
     return PipelineResult(
         surface=surface,
@@ -187,16 +190,32 @@ def run_pipeline(  # noqa: PLR0913  (what one may want to choose on the whole wa
             simulation.theta_s.values,
             analytic=analytic.model,
             monte_carlo=monte_carlo.model,
+            waves=None if waves is None else waves.model,
+            wavelength=None if waves is None else waves.wavelength,
         ),
         unknown=(
             *what_is_not_read(measurement, statistics),
-            *_beyond_optics(measurement, statistics),
+            *_beyond_optics(measurement, statistics, waves),
             *what_hangs_together(monte_carlo),
             *analytic.warnings,
         ),
         measured_slopes=own,
+        waves=waves,
         seconds=clock.seconds,
     )
+
+
+def _with_slope(
+    bring: Callable[..., FitResult],
+    curve: SimulatedModel,
+    simulated: Callable[..., SimulatedModel],
+    statistics: SurfaceStatistics,
+) -> FitResult:
+    """Fit the slope too, and simulate again where it lies far from that of the surface."""
+    found = bring(curve)
+    if abs(found.values["slope_rms"] / statistics.slope_rms.value - 1.0) > FAR:
+        found = bring(simulated(found.model.model))
+    return found
 
 
 def _own_slopes(
@@ -263,11 +282,12 @@ def _simulated(
 
 
 def _beyond_optics(
-    measurement: xr.Dataset, statistics: SurfaceStatistics
+    measurement: xr.Dataset, statistics: SurfaceStatistics, waves: WaveFit | None
 ) -> tuple[str, ...]:
-    """Name where geometric optics fails on this surface at the wavelength of the scan."""
+    """Name where geometric optics fails on this surface, and what stands in for it."""
     wavelength = one_wavelength(measurement)
     if wavelength is None:
         return ()
     rough = roughness_of(random_surface(statistics, statistics.slope_rms.value))
-    return judge(rough, np.unique(measurement.theta_i.values), wavelength).notes
+    notes = judge(rough, np.unique(measurement.theta_i.values), wavelength).notes
+    return notes if waves is None else (*notes, waves.text)

@@ -19,6 +19,7 @@ def plane_curves(
     *,
     analytic: "MicrofacetModel | WaveSurface",
     monte_carlo: "SimulatedModel | None" = None,
+    waves: "WaveSurface | None" = None,
     phi_i: float = 0.0,
     wavelength: float | None = None,
 ) -> xr.Dataset:
@@ -34,6 +35,8 @@ def plane_curves(
         The model in closed form.
     monte_carlo : SimulatedModel, optional
         The simulated one.
+    waves : WaveSurface, optional
+        Wave optics beside facets.
     phi_i : float
         Azimuth of the plane. [rad]
     wavelength : float, optional
@@ -42,7 +45,7 @@ def plane_curves(
     Returns
     -------
     Dataset, dims theta_i, theta_view
-        `analytic_*`, `monte_carlo_*` and the `monte_carlo_*_stderr` of each.
+        `analytic_*`, `monte_carlo_*` and the `monte_carlo_*_stderr` of each, `waves_*`.
     """
     view = np.concatenate([-theta_s[::-1], theta_s])
     angles = np.meshgrid(theta_i, view, indexing="ij")
@@ -58,6 +61,8 @@ def plane_curves(
             "monte_carlo_m10_stderr": error[..., 1, 0] / simulated[..., 0, 0],
             "monte_carlo_DOLP_stderr": error[..., 1, 0] / simulated[..., 0, 0],
         }
+    if waves is not None:
+        values |= _named("waves", waves.brdf(*where, wavelength, phi_i=phi_i))
     return xr.Dataset(
         {name: (("theta_i", "theta_view"), value) for name, value in values.items()},
         coords={"theta_i": theta_i, "theta_view": view},

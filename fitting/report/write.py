@@ -101,7 +101,7 @@ def _in_units(result: "PipelineResult") -> xr.Dataset:
 
 def result_dataset(result: "PipelineResult") -> xr.Dataset:
     """Return simulation, curves and scan as one dataset, the fits as its attributes."""
-    scan, own = result.measurement, result.measured_slopes
+    scan, own, waves = result.measurement, result.measured_slopes, result.waves
     angles = {name: f"scan_{name}" for name in scan.coords}
     measured = scan.rename({**angles, **{name: f"scan_{name}" for name in scan.data_vars}})
     together = xr.merge(
@@ -110,6 +110,7 @@ def result_dataset(result: "PipelineResult") -> xr.Dataset:
             result.curves,
             measured.reset_coords(),
             *([] if own is None else [own.to_dataset()]),
+            *([] if waves is None else [waves.coherent.to_dataset(name="coherent")]),
         ],
         combine_attrs="drop",
         compat="no_conflicts",
@@ -122,6 +123,7 @@ def result_dataset(result: "PipelineResult") -> xr.Dataset:
         "monte_carlo_fit": result.monte_carlo.as_dict(),
         "analytic_model": model_text(result.model),
         **({} if own is None else {"measured_slopes": own.as_dict()}),
+        **({} if waves is None else {"wave_fit": waves.fit.as_dict()}),
     }
     return together
 
@@ -141,6 +143,8 @@ def fit_columns(result: "PipelineResult") -> "dict[str, FitResult]":
         f"Analytical, {slope}": result.analytic,
         f"Monte Carlo, {slope}": result.monte_carlo,
     }
+    if result.waves is not None:
+        fits["Waves, height and slope of the surface"] = result.waves.fit
     if result.scan_slope is not None:
         fits["Monte Carlo, slope from the scan alone"] = result.scan_slope
     return fits

@@ -20,6 +20,7 @@ _QUANTITIES = {"M00": "M00 [1/sr]", "M10": "M10 [1/sr]", "m10": "M10/M00 [1]"}
 _MODELS = {
     "monte_carlo": ("Monte Carlo", "-", COLOURS[0], "o"),
     "analytic": ("analytical", "--", COLOURS[1], "x"),
+    "waves": ("waves", "-.", COLOURS[2], "+"),
 }
 # A taller sheet than this many panels is cut, and says so
 _MOST = 12
@@ -48,7 +49,7 @@ def scan_figure(
     measured : Dataset, dim geometry
         In-plane rows with theta_view [rad], theta_i [rad] and any of the quantities.
     curves : Dataset, dims theta_i, theta_view, optional
-        `analytic_*`, `monte_carlo_*` and `monte_carlo_*_stderr` of each quantity.
+        `analytic_*`, `waves_*`, `monte_carlo_*`, `monte_carlo_*_stderr` of each quantity.
     width_mm : float
         Width that the figure is printed at; below 115 mm the quantities stand in a column.
         [mm]

@@ -92,33 +92,11 @@ def map_scattering(
             f"{steps.max():.4g} um. Interpolate the map, or take a longer wavelength."
         )
         raise ValueError(msg)
-    relief = Relief(
-        np.asarray(height_map.heights, dtype=np.float64),
-        steps,
-        periodic=height_map.periodic,
-    )
-    heights = relief.heights
+    heights = np.asarray(height_map.heights, dtype=np.float64)
+    relief = Relief(heights, steps, periodic=height_map.periodic)
     k = 2 * np.pi / wave
-    # Lateral wave vectors over k of the waves that leave: k_s = k_i + K
     travel = np.array([np.cos(phi_i + np.pi), np.sin(phi_i + np.pi)])
-    grids = [
-        2 * np.pi * scipy.fft.fftfreq(count, step) / k
-        for count, step in zip(heights.shape, steps, strict=True)
-    ]
-    east = grids[0][:, None] + np.sin(angle) * travel[0]
-    north = grids[1][None, :] + np.sin(angle) * travel[1]
-    cosine2 = 1.0 - east**2 - north**2
-    leaving = np.argwhere(cosine2 > 1e-6)
-    cosine = np.sqrt(cosine2[tuple(leaving.T)])
-    lateral = np.stack([
-        np.broadcast_to(east, cosine2.shape)[tuple(leaving.T)],
-        np.broadcast_to(north, cosine2.shape)[tuple(leaving.T)],
-    ])  # fmt: skip
-    # In the frame of the incident wave
-    turned = np.stack([
-        travel[0] * lateral[0] + travel[1] * lateral[1],
-        travel[0] * lateral[1] - travel[1] * lateral[0],
-    ])  # fmt: skip
+    leaving, cosine, turned = _leaving(relief, np.sin(angle), travel, k)
     plane, first = np.empty((2, cosine.size, 4), dtype=np.complex128)
     fill_modes(angle, turned, n, kappa, plane, first)
     weighted = method == "order-weighted"
@@ -156,6 +134,27 @@ def _check_method(method: str) -> None:
             "others need statistics: WaveModel has them."
         )
         raise ValueError(msg)
+
+
+def _leaving(
+    relief: Relief, sine: float, travel: Array, k: float
+) -> tuple[Array, Array, Array]:
+    """Find the waves that leave: places in a transform, cosines, lateral vectors over k.
+
+    The vectors k_s = k_i + K are (2, N), in the frame of the incident wave.
+    """
+    grids = [
+        2 * np.pi * scipy.fft.fftfreq(count, step) / k
+        for count, step in zip(relief.heights.shape, relief.spacing, strict=True)
+    ]
+    east = grids[0][:, None] + sine * travel[0]
+    north = grids[1][None, :] + sine * travel[1]
+    cosine2 = 1.0 - east**2 - north**2
+    leaving = np.argwhere(cosine2 > 1e-6)
+    at = tuple(leaving.T)
+    x, y = (np.broadcast_to(part, cosine2.shape)[at] for part in (east, north))
+    turned = np.stack([travel[0] * x + travel[1] * y, travel[0] * y - travel[1] * x])
+    return leaving, np.sqrt(cosine2[at]), turned
 
 
 def _amplitudes(
