@@ -1,5 +1,6 @@
 """Text files in, with a line number for everything that is wrong in them."""
 
+import re
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +16,8 @@ from pbrdf.errors import DataFileError
 COMMENT_MARKS = ("#", "%")
 # Lines of words before the numbers, of which there may be a million
 MOST_HEADER = 100_000
+# A number as Fortran writes it in double precision
+_FORTRAN = re.compile(r"(?<![\w.])[-+]?\d*\.\d*[dD][-+]?\d{1,3}(?!\w)")
 # Signs of the name of a column
 LONGEST_NAME = 500
 
@@ -101,12 +104,14 @@ def split_header(path: str | Path, block: int | None = None) -> tuple[list[Line]
     texts = unquoted(read_texts(path))
     blocks = _blocks(texts)
     if not blocks:
-        raise DataFileError(
-            path,
-            "expected lines of numbers, found none",
+        cure = (
             "Give columns of numbers separated by comma, semicolon, tab or space, "
-            "without separators of thousands.",
+            "without separators of thousands."
         )
+        fortran = next((text for text in texts if _FORTRAN.search(text)), None)
+        if fortran is not None:
+            cure = "Write exponents with E instead of Fortran's D: 1.0E+00, not 1.0D+00."
+        raise DataFileError(path, "expected lines of numbers, found none", cure)
     numbers = _chosen_block(path, texts, blocks, block)
     header = [
         Line(i, text)
@@ -279,6 +284,8 @@ def _first_fault(
             if not is_number(cell) or np.isinf(float(cell)):
                 name = names[i] if names and i < len(names) else str(i + 1)
                 problem = f"expected a finite number, got {cell!r}"
+                if i == 0 and line.number > data.first.number and not is_number(cell):
+                    cure = "Delete the line if it belongs to no point, as a footer."
                 return DataFileError(path, problem, cure, line=line.number, column=name)
         if len(cells) != width:
             problem = (

@@ -12,6 +12,7 @@ from data_io.text.text import Line, Rows
 from data_io.text.units import (
     axis_units,
     header_units,
+    normalise_unit,
     sole_unit,
     unit_kind,
     unit_size,
@@ -142,6 +143,8 @@ def _check_units(path: str | Path, chosen: ProfileColumns, line: int | None) -> 
         if column.unit and column.kind not in kinds and not slopes:
             problem = f"expected {words}, got {column.unit!r}"
             cure = "Convert the column and head it with its unit, or choose by columns=."
+            if normalise_unit(column.unit) == "in":
+                cure = "Inches are written 'inch' here. Head the column so."
             raise DataFileError(path, problem, cure, line=line, column=column.name)
 
 

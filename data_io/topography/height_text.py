@@ -25,9 +25,18 @@ class CoordinatesWarning(UserWarning):
     """A first row or column of a matrix was taken for positions, and not for heights."""
 
 
-def known_steps(path: Path, spacing: Spacing | None) -> tuple[float, float]:
+def known_steps(
+    path: Path, spacing: Spacing | None, header: Sequence[Line] = ()
+) -> tuple[float, float]:
     """Return (dx, dy) given by the caller, or say that they are missing."""
     if spacing is None:
+        for line in header:
+            name, _, value = line.text.strip().partition(" ")
+            # ESRI grids
+            if name.lower() == "cellsize":
+                problem = f"expected a step with its unit, got cellsize {value.strip()!r}"
+                cure = "Give spacing= in um; such grids name no unit."
+                raise DataFileError(path, problem, cure, line=line.number)
         problem = "expected a grid spacing, the file names none"
         cure = "Give spacing= in um, or in a text file the line '# spacing_um = ...'."
         raise DataFileError(path, problem, cure)
@@ -107,7 +116,9 @@ def read_text_map(
         raise DataFileError(path, problem, "Leave the argument out or mend the header.")
     size = unit_factor(unit or "um") if factor is None else factor
     if steps is None or spacing is None or np.allclose(steps, spacing):
-        found_map = build_map(path, rows * size, steps or known_steps(path, spacing))
+        found_map = build_map(
+            path, rows * size, steps or known_steps(path, spacing, header)
+        )
     else:
         found_map = with_spacing(path, build_map(path, rows * size, steps), spacing)
     if factor is None and unit is None:

@@ -143,3 +143,25 @@ def test_lists_name_their_units_in_many_ways(tmp_path, header):
 def test_a_map_that_can_be_read_in_two_ways_is_refused(tmp_path, text, message):
     with pytest.raises(DataFileError, match=message):
         read_height_map(write(tmp_path, text, name="map.xyz"), spacing=1.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "cure"),
+    [
+        ("x_um,z_um\n0.5D+00,1.5D-01\n1.0D+00,1.6D-01\n", "with E instead of Fortran's D"),
+        ("x_um,z_um\n0,1.5\n1,2.5\n2,0.5\nMean,1.5\n", "Delete the line if it belongs"),
+        ("x (in),z (in)\n0,1.5\n1,2.5\n2,0.5\n", "written 'inch'"),
+    ],
+)
+def test_refused_tables_say_what_to_change(tmp_path, text, cure):
+    with pytest.raises(DataFileError, match=cure):
+        read_profile(write(tmp_path, text))
+
+
+def test_the_step_of_an_esri_grid_is_not_taken_without_a_unit(tmp_path):
+    rows = "\n".join("0.1 0.2 0.3 0.4" for _ in range(4))
+    path = write(tmp_path, f"ncols 4\nnrows 4\ncellsize 0.5\n{rows}\n", name="grid.asc")
+    with pytest.raises(DataFileError, match=r"line 3: .* cellsize '0\.5'"):
+        read_height_map(path)
+    with pytest.warns(UserWarning, match="no length unit"):
+        assert read_height_map(path, spacing=0.5).spacing == (0.5, 0.5)
