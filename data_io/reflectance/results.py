@@ -143,9 +143,9 @@ def _plain_again(path: str | Path, dataset: xr.Dataset) -> xr.Dataset:
     )
     try:
         dataset.attrs = decode(dataset.attrs)
-        for name in dataset.variables:
-            dataset[name].attrs = decode(dataset[name].attrs)
-            dataset[name].encoding = {}
+        for variable in dataset.variables.values():
+            variable.attrs = decode(variable.attrs)
+            variable.encoding = {}
     except FAULTS as error:
         problem = f"an attribute is no JSON: {first_line(error)}"
         raise DataFileError(path, problem, "The file is damaged.") from error

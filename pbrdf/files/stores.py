@@ -2,9 +2,10 @@
 
 import json
 import math
+import os
 import stat
-from collections.abc import Iterator
-from itertools import chain
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,10 @@ _MOST_EXPANSION = 2000
 # Points of a sweep, whose states are read at once
 _MOST_POINTS = 10**8
 _HOSTILE = "A result holds its own data; do not read it from a stranger."
+# What tells of the store and of each variable
+_ABOUT = "zarr.json"
+# Bytes that a folder takes
+_FOLDER = 4096
 _DAMAGED = "The file is damaged; copy it again or repeat the run."
 
 
@@ -45,7 +50,7 @@ def check_store(path: Path, *, sparse: bool = False) -> None:
     DataFileError
         Naming the variable.
     """
-    size = _size(path)
+    size, files = _walked(path)
     for name, about in _variables(path):
         place = f"variable {name[:80]}"
         try:
@@ -66,30 +71,55 @@ def check_store(path: Path, *, sparse: bool = False) -> None:
             )
             raise DataFileError(path, problem, _DAMAGED, column=place)
         if not sparse:
-            _check_pieces(path, name, count, float(np.prod(pieces)))
+            held = files[name.partition("/")[0]]
+            _check_pieces(path, name, held, count, float(np.prod(pieces)))
 
 
-def _size(path: Path) -> int:
-    """Return the size of all files of a store; refuse links, devices and endless depth."""
-    size = 0
+def _entries(path: Path) -> Iterator[tuple[str, os.DirEntry[str]]]:
+    """Yield what a folder holds at any depth, each with the folder that it is in."""
+    waiting = [str(path)]
+    while waiting:
+        folder = waiting.pop()
+        try:
+            with os.scandir(folder) as found:
+                entries = list(found)
+        except FileNotFoundError:
+            # A sweep that is running has moved it to its place
+            continue
+        for entry in entries:
+            yield folder, entry
+            if entry.is_dir(follow_symlinks=False):
+                waiting.append(entry.path)
+
+
+def _walked(path: Path) -> tuple[int, dict[str, list[str]]]:
+    """Return the size of a store and the pieces of each of its variables.
+
+    Refuses links, devices and endless depth.
+    """
+    size, pieces = 0, defaultdict[str, list[str]](list)
+    start = len(str(path)) + 1
     try:
-        for number, entry in enumerate(chain([path], path.rglob("*"))):
-            try:
-                mode = entry.lstat()
-            except FileNotFoundError:
-                # A sweep that is running has moved it to its place
-                continue
-            if number > _MOST_FILES or (number and stat.S_ISLNK(mode.st_mode)):
+        for number, (folder, entry) in enumerate(_entries(path)):
+            if number > _MOST_FILES or entry.is_symlink():
                 problem = f"{entry.name[:80]} is a link, or one of too many files"
                 raise DataFileError(path, problem, _HOSTILE)
-            regular = stat.S_ISREG(mode.st_mode) or stat.S_ISDIR(mode.st_mode)
-            if number and not regular:
+            if entry.is_dir(follow_symlinks=False):
+                size += _FOLDER
+                continue
+            try:
+                mode = entry.stat(follow_symlinks=False)
+            except FileNotFoundError:
+                continue
+            if not stat.S_ISREG(mode.st_mode):
                 problem = f"{entry.name[:80]} is no regular file"
                 raise DataFileError(path, problem, _HOSTILE)
             size += mode.st_size
-    except (RecursionError, OSError) as error:
+            if entry.name != _ABOUT:
+                pieces[folder[start:].partition(os.sep)[0]].append(entry.path)
+    except OSError as error:
         raise DataFileError(path, "its folders nest too deeply", _HOSTILE) from error
-    return size
+    return size, pieces
 
 
 def _pieces(about: dict[str, Any]) -> list[Any]:
@@ -97,16 +127,16 @@ def _pieces(about: dict[str, Any]) -> list[Any]:
     return list(about["chunk_grid"]["configuration"]["chunk_shape"])
 
 
-def _check_pieces(path: Path, name: str, count: float, piece: float) -> None:
+def _check_pieces(
+    path: Path, name: str, files: Iterable[str], count: float, piece: float
+) -> None:
     """Refuse pieces that are too many, or would grow beyond their size."""
     place = f"variable {name[:80]}"
     if not piece > 0 or count > _MOST_PIECES * piece:
         problem = f"its {count:g} values are in pieces of {piece:g}"
         raise DataFileError(path, problem, _DAMAGED, column=place)
-    for file in (path / name / "c").rglob("*"):
-        if not file.is_file():
-            continue
-        with file.open("rb") as stream:
+    for file in files:
+        with Path(file).open("rb", buffering=0) as stream:
             grown = _grown(stream.read(18))
         if grown is not None and grown > 16 * piece + _MOST_TEXT:
             problem = f"a piece of it would take {grown / 2**20:.0f} MiB"

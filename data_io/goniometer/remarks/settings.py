@@ -9,7 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from data_io.goniometer.declarations import Declared
-from data_io.goniometer.remarks.wavelengths import doubtful_wavelength, wavelengths_of
+from data_io.goniometer.remarks.wavelengths import (
+    LIGHT,
+    doubtful_wavelength,
+    wavelengths_of,
+)
 from data_io.goniometer.remarks.words import azimuth_of, gain_of, plain, polarisation_of
 from data_io.goniometer.scan import STDERR, ConventionWarning
 from data_io.goniometer.tables.columns import Columns
@@ -137,7 +141,7 @@ def one_wavelength(
     Warns
     -----
     ConventionWarning
-        If it names no unit, or a length may be one, and no column holds it.
+        If it names no unit, is of no light, or a length may be one, and no column holds it.
     """
     texts = list(texts)
     waves = [wave for text in texts for wave in wavelengths_of(text)]
@@ -164,7 +168,12 @@ def one_wavelength(
     doubtful = [length for text in texts if (length := doubtful_wavelength(text))]
     if not known and (bare or doubtful):
         if bare:
-            what, words = f"the wavelength {bare[0]} names no unit", "633 nm"
+            said = shortened(bare[0], 40)
+            what, words = f"the wavelength {said} names no unit", "633 nm"
+            if " " in bare[0]:
+                what = (
+                    f"the wavelength {said} is not between {LIGHT[0]} and {LIGHT[1]:g} um"
+                )
         else:
             what, words = f"{doubtful[0]} may be the wavelength", doubtful[0]
         msg = f"{path.name}: {what} and is left out: write wavelength {words}."

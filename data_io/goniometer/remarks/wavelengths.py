@@ -6,7 +6,7 @@ from typing import NamedTuple
 from data_io.goniometer.remarks.words import plain
 from pbrdf.optics.published.columns import Column, unit_of
 
-__all__ = ["Wavelength", "doubtful_wavelength", "wavelengths_of"]
+__all__ = ["LIGHT", "Wavelength", "doubtful_wavelength", "wavelengths_of"]
 
 _NUMBER = r"(?<![\w.])(?<!\d,)(\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 _UNIT = r"((?:1/|µ|μ)?[^\W\d_]+(?:\s?(?:\^|\*\*)?-1|⁻¹)?)"
@@ -52,11 +52,11 @@ _LENGTHS = re.compile(
     re.IGNORECASE,
 )
 # Light that anybody measures a BRDF with [um]
-_LIGHT = (0.05, 1000.0)
+LIGHT = (0.05, 1000.0)
 
 
 class Wavelength(NamedTuple):
-    """A wavelength as it is written; its size, None without a unit. [um]"""
+    """A wavelength as it is written; its size, None without a unit or of no light. [um]"""
 
     words: str
     size: float | None
@@ -110,7 +110,10 @@ def doubtful_wavelength(text: str) -> str | None:
 
 
 def _wavelength(number: str, unit: str) -> Wavelength | None:
-    """Return a wavelength, None for a number with another unit or of another kind."""
+    """Return a wavelength, None for a number with another unit or of another kind.
+
+    One that no light has is without a size.
+    """
     known = unit_of(unit) if unit else None
     if known is None:
         # "0.633 (laser)", "0.633 and", not "5 mW"
@@ -120,5 +123,5 @@ def _wavelength(number: str, unit: str) -> Wavelength | None:
     if value <= 0:
         return None
     size = float(Column("wavelength", "wavelength", known).to_um([value])[0])
-    within = _LIGHT[0] <= size <= _LIGHT[1]
-    return Wavelength(f"{number} {unit}", size) if within else None
+    within = LIGHT[0] <= size <= LIGHT[1]
+    return Wavelength(f"{number} {unit}", size if within else None)

@@ -26,6 +26,8 @@ POLARISATIONS = {
 UNPOLARISED = {"u", "unpol", "unpol.", "unpolarised", "unpolarized", "none"}
 # What is longer is no setting, and may be a line without end
 _LONGEST = 400
+# Of a number no more digits are looked at, in so much of a remark
+_DIGITS, _CUT = re.compile(r"(\d{40})\d+"), 5000
 _QUANTITY = re.compile(
     r"(?P<key>(?:measured |measurement )?(?:quantity|type|values?)|data type)\b"
     r"\s*(?P<mark>[:=;,|\t]?)\s*(?P<value>.+)",
@@ -69,7 +71,8 @@ class Quantity(NamedTuple):
 
 def plain(text: str) -> str:
     """Return a remark without marks of comments and quotation marks."""
-    return text.strip()[:_LONGEST].lstrip("#%!/;' \t").replace('"', "").rstrip(",; \t")
+    text = _DIGITS.sub(r"\1", text.strip()[:_CUT])
+    return text[:_LONGEST].lstrip("#%!/;' \t").replace('"', "").rstrip(",; \t")
 
 
 def quantity_of(text: str) -> Quantity | None:

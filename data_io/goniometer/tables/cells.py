@@ -70,8 +70,13 @@ def numbers_of(text: pd.Series) -> tuple[np.ndarray, np.ndarray]:
     >>> numbers.tolist(), wrong.tolist()
     ([0.5, nan, nan], [False, False, True])
     """
-    text = text.str.replace(",", ".", regex=False).where(text.str.fullmatch(_COMMA), text)
-    numbers = pd.to_numeric(text, errors="coerce").to_numpy(float)
+    numbers = pd.to_numeric(text, errors="coerce").to_numpy(float, copy=True)
+    gone = np.isnan(numbers)
+    other = text[gone]
+    if other.str.contains(",", regex=False).any():
+        pointed = other.str.replace(",", ".", regex=False)
+        pointed = pointed.where(other.str.fullmatch(_COMMA), other)
+        numbers[gone] = pd.to_numeric(pointed, errors="coerce").to_numpy(float)
     rest = np.isnan(numbers) | text.str.contains("_", regex=False).to_numpy(bool)
     gaps = np.zeros(rest.size, dtype=bool)
     gaps[rest] = [is_gap(cell) for cell in text.to_numpy()[rest]]
@@ -87,7 +92,11 @@ def sign_behind(text: pd.Series) -> tuple[pd.Series, str]:
     >>> bare.tolist(), unit
     (['30', 'n/a'], 'deg')
     """
-    ends = {cell[-1:] for cell in text if not is_gap(cell)}
+    held = text.to_numpy()
+    first = next((cell for cell in held if not is_gap(cell)), "")
+    if first[-1:] not in _SIGNS:
+        return text, ""
+    ends = {cell[-1:] for cell in held if not is_gap(cell)}
     if len(ends) != 1 or (sign := ends.pop()) not in _SIGNS:
         return text, ""
     bare = text.str.removesuffix(sign).str.rstrip()
@@ -155,6 +164,8 @@ def _refuse_points_of_thousands(
     path: Path, name: str, text: pd.Series, lines: Sequence[int]
 ) -> None:
     """Refuse 1.234 beside 950: no number has another count of decimals, none is below 1."""
+    if sum(len(cell) in (3, 4) for cell in text.to_numpy()) < 2:
+        return
     dotted = text.str.fullmatch(r"[-+]?[1-9]\d{0,2}\.\d{3}").to_numpy(bool)
     whole = text.str.fullmatch(r"[-+]?[1-9]\d{2}").to_numpy(bool)
     if min(dotted.sum(), whole.sum()) < 2 or not (

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from data_io.goniometer.scan import ConventionWarning
@@ -103,14 +104,21 @@ class RawTable:
 
     def marks(self, column: int) -> list[str]:
         """Return the words that stand for gaps in a column, one for each of its cells."""
-        text = self.cells.iloc[:, column]
+        text = self.cells.iloc[:, column].to_numpy()
+        # No mark is a number
+        others = text[np.isnan(pd.to_numeric(text, errors="coerce"))].tolist()
         plain = {"", "nan"}
-        return [cell for cell in text if is_gap(cell) and cell.lower() not in plain]
+        return [cell for cell in others if cell.lower() not in plain and is_gap(cell)]
 
     def is_text(self, column: int) -> bool:
         """Tell whether no cell of a column is a number, and any says something."""
-        said = [cell for cell in self.cells.iloc[:, column] if not is_gap(cell)]
-        return bool(said) and not any(map(is_plain, said))
+        said = False
+        for cell in self.cells.iloc[:, column].to_numpy():
+            if not is_gap(cell):
+                said = True
+                if is_plain(cell):
+                    return False
+        return said
 
     def require_one_notation(self, path: Path, columns: Iterable[int]) -> None:
         """Refuse commas in these columns that can be read in two ways."""
