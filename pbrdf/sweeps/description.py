@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -14,7 +15,7 @@ from pbrdf.errors import DataFileError
 from pbrdf.files import companion, read_toml
 from pbrdf.scene.read import scene_of
 from pbrdf.scene.scene import Scene
-from pbrdf.sweeps.designs import Axis, Design
+from pbrdf.sweeps.designs import Axis, Design, require_once
 from pbrdf.sweeps.places import changed, resolve, written
 from pbrdf.sweeps.settings import FIXED, RUN_KEYS, TOGETHER, WHOLE, arguments
 
@@ -213,6 +214,10 @@ def sweep_of(
         axes = [axis for axis in axes if axis not in joint]
         # One trace serves them all
         whole["simulate"] |= {str(axis.path[1]): list(axis.values) for axis in joint}
+        for key in TOGETHER:
+            given = whole["simulate"].get(key)
+            if isinstance(given, list):
+                require_once(key, given)
         if not axes:
             msg = (
                 "a sweep must vary more than the light, got "
@@ -253,10 +258,13 @@ def _axis(name: str, given: Any, document: Mapping[str, Any]) -> Axis:
             )
             raise ValueError(msg)
         known = scale in ("linear", "log")
-        numbers = all(type(v) in (int, float) for v in (low, high))
+        numbers = all(
+            type(v) in (int, float) and math.isfinite(v)  # type: ignore[arg-type]
+            for v in (low, high)
+        )
         if not numbers or not known or not low < high or (scale == "log" and low <= 0):  # type: ignore[operator]
             msg = (
-                f"{name} must have from below to, positive for scale = 'log', got "
+                f"{name} must have from below to, finite, positive for scale = 'log', got "
                 f"{dict(given)}."
             )
             raise ValueError(msg)

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,9 +11,29 @@ import numpy as np
 
 from pbrdf.sweeps.places import Path
 
-__all__ = ["KINDS", "Axis", "Design"]
+__all__ = ["KINDS", "Axis", "Design", "require_once"]
 
 KINDS = ("grid", "list", "latin-hypercube", "sobol")
+
+
+def require_once(name: str, values: Sequence[Any]) -> None:
+    """Refuse a value that stands twice in a list; 2 and 2.0 are one.
+
+    Raises
+    ------
+    ValueError
+        Naming the first such value.
+    """
+    counts = Counter(_compared(value) for value in values)
+    for value in values:
+        if counts[_compared(value)] > 1:
+            msg = f"{name} must have each value once, got {value!r} again."
+            raise ValueError(msg)
+
+
+def _compared(value: Any) -> str:
+    plain = isinstance(value, int) and not isinstance(value, bool)
+    return repr(float(value) if plain and abs(value) < 2**53 else value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,14 +103,18 @@ class Design:
                     "Ranges are for latin-hypercube and sobol: set kind in [design]."
                 )
                 raise ValueError(msg)
-            twice = [text for text, n in Counter(map(repr, axis.values)).items() if n > 1]
-            if self.kind == "grid" and twice:
-                msg = f"{axis.name} must have each value once, got {twice[0]} again."
-                raise ValueError(msg)
+            if self.kind == "grid":
+                require_once(axis.name, axis.values)
         lengths = {axis.name: len(axis.values) for axis in self.axes}
         if self.kind == "list" and len(set(lengths.values())) != 1:
             told = ", ".join(f"{name} {length}" for name, length in lengths.items())
             msg = f"values of a list must be as many for each name, got {told}."
+            raise ValueError(msg)
+        if not sampled and self.points:
+            msg = (
+                f"[design]: points belongs to latin-hypercube and sobol, a {self.kind} has "
+                f"as many as its values, got {self.points!r}. Leave it out."
+            )
             raise ValueError(msg)
         for name, least in (("points", 1 if sampled else 0), ("seed", 0)):
             value = getattr(self, name)
