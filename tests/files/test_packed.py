@@ -27,8 +27,12 @@ def refused(path, match):
 def inflating(file):
     """Eight kilobytes that inflate to a gigabyte; HDF5 goes on to the end of them."""
     variable = file.create_dataset("brdf", (1000,), "f8", chunks=(1000,), compression=9)
-    packer = zlib.compressobj(9)
-    zeros = b"".join(packer.compress(bytes(2**24)) for _ in range(64)) + packer.flush()
+    packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
+    # A block on its own, which may stand there any number of times
+    block = packer.compress(bytes(2**24)) + packer.flush(zlib.Z_FULL_FLUSH)
+    # Adler's sum of zeros is 1, and their number modulo 65521
+    adler = (2**30 % 65521) << 16 | 1
+    zeros = b"\x78\xda" + 64 * block + b"\x03\x00" + adler.to_bytes(4, "big")
     variable.id.write_direct_chunk((0,), zeros)
 
 

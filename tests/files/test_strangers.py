@@ -164,7 +164,7 @@ def test_a_scene_reads_files_of_its_own_folder_only(tmp_path):
 
 def bomb_x3p(path: Path) -> None:
     xml = b"<a>" + b" " * (300 * 2**20) + b"</a>"
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         archive.writestr("main.xml", xml)
 
 
