@@ -136,7 +136,11 @@ def over_orders(sums, plain, per_order, mean, moments):
 
 @jit(forceinline=True)
 def reach_of_shift(ray_in, ray_out, x, y):
-    """Share of a shift at which one of the two waves would reach the horizon."""
+    """Share of a shift that keeps both waves from the horizon; 1 of one that is small.
+
+    Of the share t where one of them would reach it, (1 + t^-8)^(-1/8): a step would show as
+    a kink wherever a surface or wavelength brings waves there.
+    """
     middle_x = 0.5 * (ray_out.sin * ray_out.along + ray_in.sin * ray_in.along)
     middle_y = 0.5 * (ray_out.sin * ray_out.across + ray_in.sin * ray_in.across)
     rim = max(HORIZON, max(ray_in.sin, ray_out.sin))
@@ -144,8 +148,9 @@ def reach_of_shift(ray_in, ray_out, x, y):
     along = 0.5 * abs(middle_x * x + middle_y * y)
     room = rim * rim - middle_x * middle_x - middle_y * middle_y
     # square t^2 + 2 along t = room, the worse sign of the two
-    root = room / (along + sqrt(along * along + square * room) + 1e-300)
-    return min(root, 1.0)
+    inverse = (along + sqrt(along * along + square * room)) / (room + 1e-300)
+    fourth = inverse * inverse * inverse * inverse
+    return 1.0 / sqrt(sqrt(sqrt(1.0 + fourth * fourth)))
 
 
 @jit
