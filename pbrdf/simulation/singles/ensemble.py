@@ -1,5 +1,7 @@
 """The joint law of the heights and slopes of one facet of a Gaussian surface."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from pbrdf.kernels.sights.light import SlopeLaw
@@ -10,6 +12,8 @@ from pbrdf.surface import GaussianSurface
 __all__ = ["facet_ensemble"]
 
 
+# Runs that differ in their seeds or rays share it
+@lru_cache(maxsize=16)
 def facet_ensemble(surface: GaussianSurface) -> Ensemble:
     """Law of three corners of a facet, exact for the mesh."""
     pitch = np.broadcast_to(np.asarray(surface.spacing, dtype=float), (2,))
