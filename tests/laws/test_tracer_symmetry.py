@@ -48,19 +48,27 @@ def test_b12_single_facet_is_pure_and_passive(n, kappa, theta_i, phi_i, slope_x,
 
 
 def test_b12_every_bin_is_a_sum_of_pure_matrices(measured):
+    """Of rays to rounding; of looks less looks to far within the stated error."""
     surface = GaussianSurface(
         shape=(128, 128), spacing=1.0, corr_length=8.0, slope_rms=0.47
     )
-    result = simulate(
-        Scene(surface, GOLD_LIKE), np.deg2rad([20.0, 70.0]), n_rays=4000, realizations=8,
-        phi_i=1.0, n_theta=18, n_dphi=36,
-    )  # fmt: skip
-    for mueller in (result.brdf.values, result.brdf_total.values):
-        eigenvalues = cloude_eigenvalues(mueller)
-        lowest = eigenvalues / mueller[..., :1, 0].clip(1e-300)
-        measured("B12", "Cloude eigenvalues below 0, over M00", -lowest.min(), 1e-9)
-        polarised = np.linalg.norm(mueller[..., 1:, 0], axis=-1)
-        assert (polarised <= mueller[..., 0, 0] * (1 + 1e-12)).all()
+    for reduced in (False, True):
+        result = simulate(
+            Scene(surface, GOLD_LIKE), np.deg2rad([20.0, 70.0]), n_rays=4000,
+            realizations=8, phi_i=1.0, n_theta=18, n_dphi=36, variance_reduction=reduced,
+        )  # fmt: skip
+        for name in ("brdf", "brdf_total"):
+            mueller, error = result[name].values, result[f"{name}_stderr"].values
+            scale = mueller[..., 0, 0].clip(1e-300)
+            what, bound = "over M00", 1e-9
+            if reduced:
+                # A cell of a bin may count less than nothing by chance
+                scale = np.maximum(scale * 1e-6, error[..., 0, 0])
+                what, bound = "over the error of M00", 1e-3
+            lowest = cloude_eigenvalues(mueller) / scale[..., None]
+            measured("B12", f"Cloude eigenvalues below 0, {what}", -lowest.min(), bound)
+            excess = np.linalg.norm(mueller[..., 1:, 0], axis=-1) - mueller[..., 0, 0]
+            assert (excess <= scale * (bound if reduced else 1e-12)).all()
 
 
 def test_mirror_symmetry_of_an_isotropic_surface():
