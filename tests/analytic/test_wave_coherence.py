@@ -48,7 +48,7 @@ def test_coherence_is_lost_between_s_and_p_alone() -> None:
 
 
 def test_one_paint_from_visible_to_infrared_has_no_kink() -> None:
-    """Where local waves reach the horizon, at 11 um, the slope of DOLP changed by 0.0004."""
+    """Where local waves reach the horizon, at 11 um, DOLP changed its slope by 0.0004."""
     waves = np.geomspace(0.35, 20.0, 61)
     paint = WaveModel(Material(1.5), height_rms=0.8, corr_length=12.0)
     rows = paint.brdf(np.deg2rad(45.0), np.deg2rad(55.0), np.pi, waves)
