@@ -110,7 +110,7 @@ def result_dataset(result: "PipelineResult") -> xr.Dataset:
             result.curves,
             measured.reset_coords(),
             *([] if own is None else [own.to_dataset()]),
-            *([] if waves is None else [waves.coherent.to_dataset(name="coherent")]),
+            *([] if waves is None else [waves.coherent.to_dataset(name="waves_coherent")]),
         ],
         combine_attrs="drop",
         compat="no_conflicts",

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from data_io import Profile
+from data_io import Profile, read_result, write_result
 from fitting import run_pipeline
+from fitting.prediction.beside_waves import wave_fit
 from fitting.report.write import fit_columns, result_dataset
 from pbrdf import Material, WaveModel
 
@@ -42,7 +43,7 @@ def scan(wavelength: float) -> xr.Dataset:
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_waves_stand_beside_facets_and_fit_better() -> None:
+def test_waves_stand_beside_facets_and_fit_better(tmp_path) -> None:
     readings = scan(WAVELENGTH)
     result = run_pipeline(
         profile(), readings, material=Material(1.5), n_rays=2000, realizations=8, seed=1
@@ -54,7 +55,8 @@ def test_waves_stand_beside_facets_and_fit_better() -> None:
     assert fit.chi2 < 0.2 * result.analytic.chi2
     # The beam stands apart: it is about that of the surface that was drawn
     true = WaveModel(Material(1.5), height_rms=HEIGHT, corr_length=LENGTH)
-    beam = result_dataset(result).coherent.sel(theta_i=THETA)
+    write_result(result_dataset(result), tmp_path / "result.nc")
+    beam = read_result(tmp_path / "result.nc").waves_coherent.sel(theta_i=THETA)
     expected = true.coherent(THETA, WAVELENGTH)
     assert np.abs(beam.values - expected).max() < 0.4 * expected[0, 0]
     assert "Waves, height and slope of the surface" in fit_columns(result)
@@ -62,9 +64,7 @@ def test_waves_stand_beside_facets_and_fit_better() -> None:
     figure = result.plot()
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "waves" in labels
-    # Where the wavelength is not known, or short, facets stand alone
-    short = run_pipeline(
-        profile(), readings.drop_vars("wavelength"), material=Material(1.5), n_rays=500,
-        realizations=8, seed=1,
-    )  # fmt: skip
-    assert short.waves is None
+    # Where the wavelength is not known, or far below the heights, facets stand alone
+    for other in (readings.drop_vars("wavelength"), scan(0.02)):
+        given = {"material": Material(1.5), "free": ()}
+        assert wave_fit(result.statistics, other, pytest.fail, **given) is None
