@@ -177,7 +177,12 @@ def _check_dataset(path: str | Path, name: str, item: h5py.Dataset, size: int) -
     if item.nbytes > min(MOST_BYTES, MOST_EXPANSION * size):
         problem = f"it would take {item.nbytes / 2**20:.0f} MiB of a file of {size} bytes"
         raise DataFileError(path, problem, DAMAGED, column=place)
-    if item.chunks is None or not item.size:
+    if not item.size:
+        return
+    if item.chunks is None:
+        if not item.id.get_storage_size() and not _is_dimension(item):
+            problem = f"none of its {item.size} values was written"
+            raise DataFileError(path, problem, DAMAGED, column=place)
         return
     expected = 1
     for side, chunk in zip(item.shape, item.chunks, strict=True):
@@ -195,6 +200,13 @@ def _check_dataset(path: str | Path, name: str, item: h5py.Dataset, size: int) -
         problem = f"it holds {inside} of {expected} pieces of its data"
         raise DataFileError(path, problem, DAMAGED, column=place)
     _check_packing(path, place, item, places)
+
+
+def _is_dimension(item: h5py.Dataset) -> bool:
+    """Whether it is a length of netCDF 4 without values, which says so."""
+    said = item.attrs.get("NAME", b"")
+    text = said.decode("latin-1") if isinstance(said, bytes) else str(said)
+    return text.startswith("This is a netCDF dimension but not a netCDF variable")
 
 
 def _check_packing(

@@ -1,5 +1,6 @@
 """Stokes radiance at a sensor: sun, sky and own warmth, put together."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from itertools import product
 from math import pi
@@ -11,7 +12,7 @@ import xarray as xr
 
 from pbrdf._version import __version__
 from pbrdf.conventions import STOKES
-from pbrdf.errors import require
+from pbrdf.errors import AccuracyWarning, require
 from pbrdf.signatures.function_surface import BLACK, FunctionSurface
 from pbrdf.signatures.planck import black_body, checked_temperature
 from pbrdf.signatures.result_surface import ResultSurface, SunlitResult
@@ -21,6 +22,8 @@ from pbrdf.signatures.sun import Sun
 
 __all__ = ["signature"]
 
+# A number below was meant in degrees Celsius, or on the moon by night [K]
+COLD = 100.0
 ABSOLUTE, RELATIVE = "W m-2 sr-1 um-1", "sr-1"
 LONG_NAMES = {
     "radiance": "Stokes radiance at the sensor",
@@ -90,7 +93,7 @@ def signature(  # noqa: PLR0913  (the public signature)
     -----
     AccuracyWarning
         If a result has lost light, which would count as emitted, or was traced at another
-        azimuth.
+        azimuth; if the surface is colder than 100 K.
 
     Examples
     --------
@@ -108,6 +111,12 @@ def signature(  # noqa: PLR0913  (the public signature)
     _check_light(sun, skies, temperature)
     if temperature is not None:
         temperature = checked_temperature("temperature", temperature)
+        if temperature < COLD:
+            msg = (
+                f"temperature is {temperature:g} K. Temperatures are kelvins: add 273.15 "
+                "to degrees Celsius."
+            )
+            warnings.warn(msg, AccuracyWarning, stacklevel=2)
     result = _as_result(source, views, waves, simulation)
     if result is not None:
         waves = result.waves if waves is None else waves

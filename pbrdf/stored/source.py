@@ -206,7 +206,10 @@ class StoredBRDF:
         about = {"units": "1", "long_name": RESULT_VARIABLES["albedo_stderr"].long_name}
         of = ("theta_i", "wavelength") if waves is not None else ("theta_i",)
         out["albedo_stderr"] = (of, total if waves is not None else total[:, 0], about)
-        told = ", ".join(f"{name}={value}" for name, value in parameters.items())
+        told = ", ".join(
+            f"{name}={value:.6g}" if isinstance(value, float) else f"{name}={value}"
+            for name, value in parameters.items()
+        )
         out.attrs = {"store": self._contents.path.name, "interpolated_at": told}
         place = parameters if waves is None else parameters | {"wavelength": each}
         along = self._contents.between(incidences, self._contents.named(place))

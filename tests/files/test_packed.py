@@ -13,6 +13,7 @@ import pytest
 
 from data_io import read_result, write_result
 from pbrdf.errors import DataFileError
+from pbrdf.files.hdf5 import opened
 from tests.fuzz.hostile import about, result
 
 
@@ -73,7 +74,7 @@ def test_hdf5(tmp_path, make, words):
 def test_a_result_holds_real_numbers(tmp_path, kind):
     path = tmp_path / "r.nc"
     with h5py.File(path, "w") as file:
-        file.create_dataset("brdf", (), np.dtype(kind))
+        file.create_dataset("brdf", data=np.zeros((), np.dtype(kind)))
     refused(path, "variable brdf: expected numbers, got")
 
 
@@ -86,6 +87,19 @@ def test_pieces_of_whole_results_are_not_taken_for_bombs(tmp_path):
             made = file.create_dataset("x", data=values, chunks=(300_000,), compression=4)
             made.make_scale("x")
         np.testing.assert_array_equal(read_result(path).x, values)
+
+
+def test_a_variable_that_was_never_written(tmp_path):
+    # A length without values is written nowhere either, and says so
+    with h5py.File(tmp_path / "length.nc", "w") as file:
+        length = file.create_dataset("theta_i", (3,), "f4")
+        length.attrs["NAME"] = b"This is a netCDF dimension but not a netCDF variable.   3"
+        file.create_dataset("albedo", data=[0.1, 0.2, 0.3])
+    with opened(tmp_path / "length.nc") as file:
+        assert list(file) == ["albedo", "theta_i"]
+    with h5py.File(tmp_path / "bare.nc", "w") as file:
+        file.create_dataset("albedo", (3,), "f8")
+    refused(tmp_path / "bare.nc", "variable albedo: none of its 3 values was written")
 
 
 def zstd(head):

@@ -9,6 +9,7 @@ from scipy.integrate import quad
 
 import pbrdf
 from pbrdf import Material, MicrofacetModel
+from pbrdf.errors import AccuracyWarning
 from pbrdf.signatures import (
     OvercastSky,
     RayleighSky,
@@ -298,3 +299,8 @@ def test_a_sensor_in_degrees_is_refused() -> None:
         pbrdf.signature(PAINT, 30.0, sun=Sun(theta=0.3))
     with pytest.raises(ValueError, match="theta must lie in"):
         Sun(theta=60.0)
+
+
+def test_a_temperature_in_degrees_celsius_is_told():
+    with pytest.warns(AccuracyWarning, match="temperature is 20 K.*add 273.15"):
+        pbrdf.signature(PAINT, 0.5, wavelength=10.0, temperature=20.0)
