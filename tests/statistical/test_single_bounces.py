@@ -5,6 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pbrdf import GaussianSurface, Material, Scene, simulate
+from pbrdf.simulation.singles.ensemble import facet_ensemble
+from pbrdf.simulation.singles.single_bounce import _averaged
 from tests.statistical.estimators import hold_together
 
 GOLD_LIKE = Material(0.958, 6.69)
@@ -135,3 +137,16 @@ def test_time_to_an_error_falls():
         # The second of each is free of compiling
         cost[wanted] = square * seconds
     assert cost[False] > 8 * cost[True]
+
+
+def test_a_spread_source_is_the_mean_of_azimuths_all_around():
+    """Over grooves, which tell a half circle from a quarter."""
+    law = facet_ensemble(UNEQUAL).law
+    what = law, (6, 8), (12, 16), (((1.5, 0.2),), 4)
+    light, _ = _averaged.__wrapped__(0.9, None, *what)
+    around = [
+        _averaged.__wrapped__(0.9, phi_i, *what)[0]
+        for phi_i in np.arange(64) * (2.0 * np.pi / 64)
+    ]
+    assert_allclose(light, np.mean(around, axis=0), rtol=0, atol=1e-9 * light.max())
+    assert np.abs(around[0] - light).max() > 0.1 * light.max()
