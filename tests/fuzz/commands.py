@@ -53,7 +53,7 @@ COMMANDS = {
     "observe": ["observe", "FILE", *RAYS, "--theta-view-deg", "0,30", "-o", "out.nc"],
     "observe --scan": ["observe", "scene.toml", "--scan", "FILE", *RAYS, "-o", "out.nc"],
     "sweep": ["sweep", "FILE", "-o", "out.nc"],
-    "sweep --vary": ["sweep", "FILE", "--vary", "n=1.4,1.5", "-o", "out.zarr"],
+    "sweep --vary": ["sweep", "FILE", "--vary", "seed=1,2", "-o", "out.zarr"],
     "dew --scene": ["dew", "--scene", "FILE", "--runs", "4", "-o", "out"],
     "pipeline": ["pipeline", "FILE", "scan.csv", "--n", "1.5", "--quick", "-o", "out"],
     "pipeline, scan": ["pipeline", "map.csv", "FILE", "--n", "1.5", "--quick", "-o", "out"],
