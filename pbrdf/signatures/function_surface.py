@@ -8,7 +8,7 @@ import numpy as np
 
 from pbrdf.signatures.sun import Sun
 
-__all__ = ["EXCHANGED", "FunctionSurface", "Light"]
+__all__ = ["EXCHANGED", "FunctionSurface", "Light", "mirrored_sun"]
 
 # Stokes radiance of the light from zeniths and azimuths [rad], shape (..., 4)
 Light = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -55,7 +55,8 @@ class FunctionSurface:
         self.oriented = isinstance(source, MicrofacetModel | WaveModel)
         self.beam = np.zeros((4, 4))
         if hasattr(source, "coherent"):
-            self.beam = np.asarray(source.coherent(theta, wavelength))
+            more = {"phi_i": phi} if isinstance(source, WaveModel) else {}
+            self.beam = np.asarray(source.coherent(theta, wavelength, **more))
 
     def facing(self, sun: Sun, irradiance: float) -> Value:
         """Stokes radiance of sunlight off the surface; irradiance facing the sun."""
@@ -68,12 +69,8 @@ class FunctionSurface:
         theta, phi, weight = theta[up], phi[up], weight[up]
         column = self._brdf(theta, self.theta, self.phi - phi, phi)[:, :, 0]
         scattered = irradiance * (column * (weight * np.cos(theta))[:, None]).sum(0)
-        # The mirror direction lies in the disc: its radiance, dimmed by the surface
-        mirror = _angle(self.theta, self.phi + pi, sun.theta, sun.phi)
-        if mirror > sun.half_angle:
-            return scattered
-        radiance = irradiance / (pi * np.sin(sun.half_angle) ** 2)
-        return scattered + radiance * self.beam[:, 0]
+        at = self.theta, self.phi
+        return scattered + mirrored_sun(self.beam, at, sun, irradiance)
 
     def gather(self, light: Light) -> Value:
         """Stokes radiance that the surface makes of the light of the whole sky."""
@@ -133,6 +130,20 @@ class FunctionSurface:
             )  # fmt: skip
             total, error = total + found.estimate, error + np.abs(found.error)
         return total, error
+
+
+def mirrored_sun(
+    beam: np.ndarray, at: tuple[float, float], sun: Sun, irradiance: float
+) -> np.ndarray:
+    """Stokes radiance of the sun in a specular beam, seen from (theta, phi).
+
+    `beam` (4, 4) is its Mueller reflectance. Where the mirror direction lies in the disc it
+    is the radiance of the disc, dimmed by the surface.
+    """
+    theta, phi = at
+    if _angle(theta, phi + pi, sun.theta, sun.phi) > sun.half_angle:
+        return np.zeros(4)
+    return np.asarray(irradiance / (pi * np.sin(sun.half_angle) ** 2) * beam[:, 0])
 
 
 def _rough(integrand: Any, side: float, half: float) -> np.ndarray:

@@ -5,7 +5,13 @@ from math import pi
 import numpy as np
 import xarray as xr
 
-from pbrdf.signatures.function_surface import BLACK, EXCHANGED, Light, Value
+from pbrdf.signatures.function_surface import (
+    BLACK,
+    EXCHANGED,
+    Light,
+    Value,
+    mirrored_sun,
+)
 from pbrdf.signatures.sun import Sun
 
 __all__ = ["ResultSurface", "SunlitResult"]
@@ -22,7 +28,8 @@ class ResultSurface:
     ----------
     dataset : xarray.Dataset
         brdf_total, brdf_total_stderr (theta_s, dphi, stokes_out, stokes_in), albedo_stderr
-        (bounces) and projected_solid_angle of one incidence and wavelength.
+        (bounces) and projected_solid_angle of one incidence and wavelength; coherent
+        (stokes_out, stokes_in) where waves leave a specular beam.
     phi : float
         Azimuth of the sensor. [rad]
     """
@@ -38,7 +45,8 @@ class ResultSurface:
         back = ("theta_s", "dphi", "stokes_in", "stokes_out")
         self.matrices = dataset.brdf_total.transpose(*back).to_numpy() * both
         self.stderr = dataset.brdf_total_stderr.transpose(*back).to_numpy()
-        self.phi = phi
+        self.theta, self.phi = float(dataset.theta_i), phi
+        self.beam = both * _beam(dataset).T
         single = dataset.brdf_total_stderr.transpose(*order).to_numpy()[..., 0, 0]
         apart = np.sqrt(((single * self.weight) ** 2).sum())
         together = np.sqrt((dataset.albedo_stderr.to_numpy() ** 2).sum())
@@ -52,14 +60,16 @@ class ResultSurface:
         scale = irradiance * np.cos(sun.theta)
         columns = self.matrices[..., 0], self.stderr[..., 0]
         value, error = _between_bins(self.zeniths, self.azimuths, at, columns)
-        return scale * value, scale * error
+        beam = mirrored_sun(self.beam, (self.theta, self.phi), sun, irradiance)
+        return scale * value + beam, scale * error
 
     def gather(self, light: Light) -> Value:
         """Stokes radiance that the surface makes of the light of the whole sky."""
         sky = self._mean(light)
         value = np.einsum("abij,abj,ab->i", self.matrices, sky, self.weight)
         square = np.einsum("abij,abj,ab->i", self.stderr**2, sky**2, self.weight**2)
-        return value, self.inflation * np.sqrt(square)
+        mirrored = light(np.array([self.theta]), np.array([self.phi + pi]))[0]
+        return value + self.beam @ mirrored, self.inflation * np.sqrt(square)
 
     def emissivity(self) -> Value:
         """Stokes vector emitted to the sensor over the radiance of a black body."""
@@ -112,7 +122,15 @@ class SunlitResult:
             (self.theta, self.phi - sun.phi), columns,
         )  # fmt: skip
         scale = irradiance * np.cos(sun.theta)
-        return scale * value, scale * error
+        beam = mirrored_sun(_beam(self.dataset), (self.theta, self.phi), sun, irradiance)
+        return scale * value + beam, scale * error
+
+
+def _beam(dataset: xr.Dataset) -> np.ndarray:
+    """Mueller reflectance of the specular beam; rays have none."""
+    if "coherent" not in dataset:
+        return np.zeros((4, 4))
+    return dataset.coherent.transpose("stokes_out", "stokes_in").to_numpy()
 
 
 def _between_bins(

@@ -51,6 +51,21 @@ class Result:
                 'simulate with phi_i="uniform".'
             )
             raise ValueError(msg)
+        known = ("theta_i", "wavelength", "phi_i", "bounces")
+        swept = [d for d in map(str, dataset.albedo_stderr.dims) if d not in known]
+        if swept:
+            msg = (
+                f"source must be one surface, it varies along {', '.join(swept)}. Pick one "
+                f"in Python, pbrdf.signature(read_result(path).sel({swept[0]}=...), ...), "
+                "or simulate it alone."
+            )
+            raise ValueError(msg)
+        if dataset.attrs.get("without_beam", False):
+            msg = (
+                "source must hold its specular beam, which waves leave and which is not "
+                "interpolated in a store. Simulate this surface."
+            )
+            raise ValueError(msg)
         if "brdf_total" not in dataset:
             # Of bounces that err independently; results of today hold the sum itself
             square = (dataset.brdf_stderr**2).sum("bounces")

@@ -1,5 +1,6 @@
 """Skies beside the clear one: overcast, warm, and measured or computed elsewhere."""
 
+import warnings
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
@@ -8,12 +9,16 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from pbrdf.errors import DataFileError, require
+from pbrdf.errors import AccuracyWarning, DataFileError, require
 from pbrdf.signatures.planck import Spectrum, black_body, checked_temperature, spectral
 
 __all__ = ["OvercastSky", "Sky", "SkyTable", "ThermalSky", "read_sky"]
 
 _ELEMENTS = ("I", "Q", "U", "V")
+# Degrees of a file
+_RANGES = {"theta_deg": (0.0, 90.0), "phi_deg": (-360.0, 360.0)}
+# Difference of the zenith from itself that is warned of, in parts of I
+MOST_APART = 0.1
 
 
 class Sky(Protocol):
@@ -100,13 +105,24 @@ class SkyTable:
     theta : array_like, shape (zeniths,)
         Rising, from 0 to at least 80 degrees; beyond the last one the last holds. [rad]
     phi : array_like, shape (azimuths,)
-        Rising, over less than a full circle; closed by the program. One azimuth means a sky
-        that looks alike on all sides. [rad]
+        Rising, all around but without a repeated one; closed by the program. One azimuth
+        means a sky that looks alike on all sides. [rad]
     values : array_like, shape (zeniths, azimuths, 4) or (wavelengths, zeniths, azimuths, 4)
         Stokes radiance in the meridian frame of the light coming down, at the zenith the
         limit at each azimuth. [W m-2 sr-1 um-1]
     wavelength : array_like, shape (wavelengths,), optional
         Rising. [um]
+
+    Raises
+    ------
+    ValueError
+        If directions or values leave their range, or azimuths leave a part of the circle
+        out.
+
+    Warns
+    -----
+    AccuracyWarning
+        If the zenith, one point of the sky, looks different from different azimuths.
     """
 
     theta: npt.ArrayLike
@@ -141,25 +157,8 @@ class SkyTable:
             if axis is not None and (axis.ndim != 1 or (np.diff(axis) <= 0).any()):
                 msg = f"{name} must rise along one axis, got {axis}. Sort the table."
                 raise ValueError(msg)
-        if theta.size < 2 or theta[0] > 1e-9 or theta[-1] < np.deg2rad(80) - 1e-9:
-            msg = (
-                "theta must run from 0 to 80 degrees or more, got "
-                f"{np.rad2deg(theta[0]):g} to {np.rad2deg(theta[-1]):g}. Extend the table."
-            )
-            raise ValueError(msg)
-        if phi[-1] - phi[0] >= 2 * pi - 1e-9:
-            msg = "phi must cover less than 360 degrees, got a repeated column. Drop it."
-            raise ValueError(msg)
-        polarised = np.linalg.norm(values[..., 1:], axis=-1)
-        if (polarised > values[..., 0] * (1 + 1e-6) + 1e-300).any():
-            place = tuple(
-                int(one) for one in np.argwhere(polarised > values[..., 0] * (1 + 1e-6))[0]
-            )
-            msg = (
-                f"values must have Q, U, V within I, got more polarised light than light "
-                f"at index {place}. Are they ratios?"
-            )
-            raise ValueError(msg)
+        _check_directions(theta, phi)
+        _check_light(theta, phi, values)
 
     def stokes(
         self, theta: npt.ArrayLike, phi: npt.ArrayLike, wavelength: float | None
@@ -189,6 +188,64 @@ class SkyTable:
         return values[low] + (place - low) * (values[high] - values[low])
 
 
+def _check_directions(theta: np.ndarray, phi: np.ndarray) -> None:
+    """Refuse directions that leave a part of the sky out."""
+    if theta.size < 2 or theta[0] > 1e-9 or theta[-1] < np.deg2rad(80) - 1e-9:
+        msg = (
+            "theta must run from 0 to 80 degrees or more, got "
+            f"{np.rad2deg(theta[0]):g} to {np.rad2deg(theta[-1]):g}. Extend the table."
+        )
+        raise ValueError(msg)
+    if phi.size == 1:
+        return
+    if phi[-1] - phi[0] >= 2 * pi - 1e-9:
+        msg = "phi must cover less than 360 degrees, got a repeated column. Drop it."
+        raise ValueError(msg)
+    left = 2 * pi - (phi[-1] - phi[0])
+    if left > 2.0 * np.diff(phi).max() + 1e-9:
+        msg = (
+            f"phi must go all around, got {np.rad2deg(phi[0]):g} to "
+            f"{np.rad2deg(phi[-1]):g} degrees, which leaves {np.rad2deg(left):g} out. Add "
+            "them; of a mirror image I and Q stay, U and V change their signs."
+        )
+        raise ValueError(msg)
+
+
+def _check_light(theta: np.ndarray, phi: np.ndarray, values: np.ndarray) -> None:
+    """Refuse what is no light, and warn of a zenith that is not one point."""
+    polarised = np.linalg.norm(values[..., 1:], axis=-1)
+    faults = {
+        "have I >= 0": (values[..., 0] < 0, "Leave noise below 0 out."),
+        "have Q, U, V within I": (
+            polarised > np.abs(values[..., 0]) * (1 + 1e-6) + 1e-300, "Are they ratios?"
+        ),
+    }  # fmt: skip
+    for rule, (wrong, cure) in faults.items():
+        if wrong.any():
+            place = tuple(np.argwhere(wrong)[0])
+            msg = (
+                f"values must {rule}, got {values[place].tolist()} at theta "
+                f"{np.rad2deg(theta[place[-2]]):g}, phi {np.rad2deg(phi[place[-1]]):g} "
+                f"degrees. {cure}"
+            )
+            raise ValueError(msg)
+    top = values[..., 0, :, :]
+    # A field that stands still turns against the meridians: Q + iU goes as exp(2i phi)
+    turns = np.exp(-2j * (phi if phi.size > 1 else np.array([0.0, pi / 2])))
+    fixed = (top[..., 1] + 1j * top[..., 2]) * turns
+    apart = np.maximum(np.abs(fixed - fixed.mean(-1, keepdims=True)).max(-1), 0.0)
+    mean = top[..., 0].mean(-1)
+    apart = np.maximum(apart, np.abs(top[..., 0] - mean[..., None]).max(-1))
+    worst = float(np.max(apart / np.where(mean > 0, mean, 1.0)))
+    if worst > MOST_APART:
+        msg = (
+            f"the zenith of the table differs by {100 * worst:.2g} % of I from azimuth to "
+            "azimuth, though it is one point. Q and U there are in the meridian of each "
+            "azimuth: Q + iU goes as exp(2i phi)."
+        )
+        warnings.warn(msg, AccuracyWarning, stacklevel=4)
+
+
 def read_sky(path: str | Path) -> SkyTable:
     """Read a sky from a CSV table.
 
@@ -216,17 +273,7 @@ def read_sky(path: str | Path) -> SkyTable:
         raise DataFileError(path, problem, "Separate the columns by commas.") from error
     keys = ["wavelength_um"] if "wavelength_um" in table else []
     keys += ["theta_deg", "phi_deg"]
-    for name in [*keys, "I"]:
-        if name not in table:
-            cure = "A sky needs theta_deg, phi_deg and I."
-            raise DataFileError(path, "missing column", cure, column=name)
-    for name in map(str, table):
-        if name not in (*keys, *_ELEMENTS):
-            cure = "Known: wavelength_um, theta_deg, phi_deg, I, Q, U, V."
-            raise DataFileError(path, "unknown column", cure, column=name)
-        if table[name].dtype.kind not in "fiu" or table[name].isna().any():
-            problem = "expected numbers in all rows"
-            raise DataFileError(path, problem, "Fill the gaps.", column=name)
+    _check_table(path, table, keys)
     table = table.reindex(columns=[*keys, *_ELEMENTS], fill_value=0.0).sort_values(keys)
     axes = [np.unique(table[name]) for name in keys]
     shape = tuple(axis.size for axis in axes)
@@ -244,6 +291,29 @@ def read_sky(path: str | Path) -> SkyTable:
     except ValueError as error:
         problem, _, cure = str(error).partition(". ")
         raise DataFileError(path, problem, cure or "Mend the table.") from error
+
+
+def _check_table(path: str | Path, table: Any, keys: list[str]) -> None:
+    """Refuse columns and angles that no sky has, by their names."""
+    for name in [*keys, "I"]:
+        if name not in table:
+            cure = "A sky needs theta_deg, phi_deg and I."
+            raise DataFileError(path, "missing column", cure, column=name)
+    for name in map(str, table):
+        if name not in (*keys, *_ELEMENTS):
+            cure = "Known: wavelength_um, theta_deg, phi_deg, I, Q, U, V."
+            raise DataFileError(path, "unknown column", cure, column=name)
+        if table[name].dtype.kind not in "fiu" or table[name].isna().any():
+            problem = "expected numbers in all rows"
+            raise DataFileError(path, problem, "Fill the gaps.", column=name)
+    for name, (low, high) in _RANGES.items():
+        wrong = table[name][(table[name] < low) | (table[name] > high)]
+        if len(wrong):
+            problem = f"expected {low:g} to {high:g} degrees, got {wrong.iloc[0]:g}"
+            raise DataFileError(path, problem, "Mend the angle.", column=name)
+    if table["theta_deg"].max() <= pi / 2:
+        problem = f"expected zeniths to 80 degrees, got {table['theta_deg'].max():g}"
+        raise DataFileError(path, problem, "Are they radians?", column="theta_deg")
 
 
 def _unpolarised(radiance: np.ndarray) -> np.ndarray:

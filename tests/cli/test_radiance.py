@@ -26,6 +26,9 @@ n = 1.5
 kappa = 0.3
 """
 
+NOON = ["--time", "2026-06-21T12:00Z", "--latitude-deg", "1", "--longitude-deg", "2"]
+WARM = ["--temperature-k", "300", "--wavelength-um", "10"]
+
 MODEL = MicrofacetModel(Material(1.5, 0.2), slope_rms=0.3, diffuse_albedo=0.1)
 
 
@@ -84,11 +87,19 @@ def test_a_result_that_is_warm(folder: Path, capsys: pytest.CaptureFixture) -> N
         (["model.toml", "--sky", "overcast"], "needs --sky-radiance"),
         (["model.toml", "--sun-zenith-deg", "30", "--sky", "rayleigh"], "--wavelength-um"),
         (["model.toml", "--sun-zenith-deg", "30", "-o", "a.txt"], ".csv or .nc"),
+        (["model.toml", "--sun-azimuth-deg", "30"], "needs --sun-zenith-deg"),
+        (["model.toml", *NOON, "--sun-azimuth-deg", "3"], "and --sun-azimuth-deg"),
+        (["model.toml", "--sun-zenith-deg", "30", "--view-azimuth-deg", "800"], "got 800."),
+        (["model.toml", "--sun-zenith-deg", "30", *WARM], "--planck-sun must be given"),
+        (["swept.zarr", "--sun-zenith-deg", "30"], "is the store of a sweep"),
     ],
 )
 def test_refusals_name_options(
     folder: Path, capsys: pytest.CaptureFixture, arguments: list[str], words: str
 ) -> None:
+    (folder / "swept.zarr").mkdir()
+    bound = '{"zarr_format": 3, "node_type": "group", "attributes": {"pbrdf_sweep": "1"}}'
+    (folder / "swept.zarr" / "zarr.json").write_text(bound)
     assert main(["radiance", *arguments]) == 2
     said = capsys.readouterr().err
     assert words in said

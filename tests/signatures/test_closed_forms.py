@@ -278,6 +278,59 @@ def test_a_table_of_the_sky_stands_in_for_its_model() -> None:
     assert_allclose(table.stokes(*at, None), sky.stokes(*at, None), rtol=5e-3, atol=1e-5)
 
 
+def test_tables_that_leave_a_part_of_the_sky_out_are_refused() -> None:
+    theta = np.deg2rad([0.0, 45.0, 90.0])
+
+    def table(phi_deg: object, **change: object) -> SkyTable:
+        values = np.tile([1.0, 0.0, 0.0, 0.0], (3, np.size(phi_deg), 1))
+        given = {"theta": theta, "phi": np.deg2rad(phi_deg), "values": values}
+        return SkyTable(**given | change)
+
+    for phi_deg, left in ((np.arange(0, 181, 30.0), "180"), ([0.0, 90.0], "270")):
+        with pytest.raises(ValueError, match=f"leaves {left} out"):
+            table(phi_deg)
+    # Uneven azimuths all around, and one for all sides
+    table([-170.0, 0.0, 10.0, 20.0, 80.0])
+    table([40.0])
+    light = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1, 1))
+    light[1, 0] = [-1.0, 0.0, 0.0, 0.0]
+    with pytest.raises(ValueError, match=r"I >= 0, got .* at theta 45, phi 40 degrees"):
+        table([40.0], values=light)
+    light[1, 0] = [1.0, 0.9, 0.9, 0.0]
+    with pytest.raises(ValueError, match=r"within I, got .* at theta 45, phi 40 degrees"):
+        table([40.0], values=light)
+
+
+def test_the_zenith_of_a_table_is_one_point() -> None:
+    """Right where Q + iU turns twice with the azimuth, as in the model; told otherwise."""
+    sky = RayleighSky(sun=Sun(theta=1.2, phi=0.3), optical_depth=0.2)
+    theta, phi = np.deg2rad([0.0, 40.0, 85.0]), np.deg2rad(np.arange(10, 370, 20.0))
+    values = sky.stokes(*np.meshgrid(theta, phi, indexing="ij"), None)
+    SkyTable(theta=theta, phi=phi, values=values)
+    still = values.copy()
+    still[0] = values[0, 0]
+    other_way = values * [1.0, 1.0, -1.0, 1.0]
+    brighter = values.copy()
+    brighter[0, 3:6] *= 1.5
+    for wrong in (still, other_way, brighter):
+        with pytest.warns(AccuracyWarning, match="though it is one point"):
+            SkyTable(theta=theta, phi=phi, values=wrong)
+    with pytest.warns(AccuracyWarning, match="though it is one point"):
+        SkyTable(theta=theta, phi=phi[:1], values=values[:, :1])
+
+
+def test_the_beam_of_grooves_depends_on_the_azimuth() -> None:
+    """Disc of the sun in brushed metal: the mean field of that azimuth, not of 0."""
+    grooves = pbrdf.WaveModel(Material(1.2, 4.0), height_rms=0.06, corr_length=(0.6, 3.0))
+    sun = Sun(theta=0.9, phi=1.2 - pi)
+    seen = pbrdf.signature(grooves, 0.9, phi_s=1.2, wavelength=0.6, sun=sun)
+    along, beam = (grooves.coherent(0.9, 0.6, phi_i=phi)[:, 0] for phi in (0.0, 1.2))
+    assert abs(beam - along)[1] > 0.03
+    assert abs(beam[2]) > 0.01
+    disc = pi * sin(sun.half_angle) ** 2
+    assert_allclose(seen.radiance * disc, beam, rtol=0, atol=1e-3)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

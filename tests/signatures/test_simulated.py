@@ -5,10 +5,19 @@ from math import pi
 
 import numpy as np
 import pytest
+import xarray as xr
 from numpy.testing import assert_allclose
 
 import pbrdf
-from pbrdf import Drops, Film, GaussianSurface, Material, MicrofacetModel, Scene
+from pbrdf import (
+    Drops,
+    Film,
+    GaussianSurface,
+    Material,
+    MicrofacetModel,
+    Scene,
+    WaveModel,
+)
 from pbrdf.errors import AccuracyWarning
 from pbrdf.signatures import OvercastSky, RayleighSky, Sun, ThermalSky, black_body
 
@@ -133,3 +142,64 @@ def test_refusals_name_what_is_missing(traced) -> None:
     lost = traced.assign(truncated=traced.truncated + 0.01)
     with pytest.warns(AccuracyWarning, match="lost in the simulation"):
         pbrdf.signature(lost, 0.3, wavelength=10.0, temperature=300.0)
+
+
+POLISHED = GaussianSurface(shape=(48, 48), spacing=1.0, corr_length=6.0, height_rms=0.04)
+
+
+@pytest.fixture(scope="module")
+def polished() -> object:
+    return pbrdf.simulate(
+        Scene(POLISHED, PAINT), [0.4, 0.9], phi_i="uniform", wave="auto", wavelength=0.6,
+        n_rays=1000, realizations=8, n_theta=18, n_dphi=24, seed=2,
+    )  # fmt: skip
+
+
+def test_the_beam_of_waves_is_part_of_what_is_seen(polished) -> None:
+    """Most light of a polished surface is a beam, which no bin holds; the model has it."""
+    model = WaveModel(PAINT, height_rms=0.04, corr_length=6.0)
+    beam = polished.coherent[1, 0, 0].item()
+    assert beam > polished.albedo[:, 1].sum().item()
+    sun = Sun(theta=0.9, phi=2.0, irradiance=900.0)
+    # The sky of another sun, whose light is not polarised along the plane of the view
+    sky = RayleighSky(sun=replace(sun, theta=0.4, phi=0.8))
+    light = {"sun": sun, "sky": sky, "temperature": 3000.0, "wavelength": 0.6}
+    at = {"theta_s": 0.9, "phi_s": 2.0 - pi + 0.001}
+    traced, closed = (pbrdf.signature(one, **at, **light) for one in (polished, model))
+    # The beam is the same; what is scattered differs by bins
+    for name in ("reflected_sun", "reflected_sky", "emissivity"):
+        assert_allclose(traced[name], closed[name], rtol=0, atol=0.01 * closed[name][0])
+    assert abs(traced.reflected_sky[2].item()) > 0.02 * traced.reflected_sky[0].item()
+    # Beside the mirror direction there is none; at it, the sun's incidence knows it too
+    for turn, lit in ((0.0, True), (0.006, False)):
+        at["phi_s"] = 2.0 - pi + turn
+        by_sensor = pbrdf.signature(polished, **at, sun=sun, wavelength=0.6).radiance
+        by_sun = pbrdf.signature(
+            polished, 0.9 - 1e-5, phi_s=at["phi_s"], sun=sun, wavelength=0.6
+        ).radiance  # fmt: skip
+        radiance = 900.0 / (pi * np.sin(sun.half_angle) ** 2) * polished.coherent[1, :, 0]
+        assert (by_sensor[0].item() > 0.9 * radiance[0].item()) is lit
+        if lit:
+            assert_allclose(by_sun, by_sensor, rtol=0, atol=1e-3 * radiance[0].item())
+
+
+def test_isothermal_surface_of_waves_is_black(polished) -> None:
+    seen = pbrdf.signature(
+        polished, 0.4, wavelength=0.6, temperature=3000.0,
+        sky=ThermalSky(temperature=3000.0),
+    )  # fmt: skip
+    body = float(black_body(0.6, 3000.0))
+    assert_allclose(seen.radiance / body, [1, 0, 0, 0], rtol=0, atol=1e-12)
+    reflected = 1.0 - float(polished.absorbed[0])
+    assert_allclose(1.0 - seen.emissivity[0], reflected, atol=1e-3)
+
+
+def test_a_sweep_of_several_surfaces_is_refused_by_its_axis(traced) -> None:
+    both = xr.concat([traced, traced], dim=xr.DataArray([0.1, 0.2], dims="slope_rms"))
+    both.attrs = traced.attrs
+    with pytest.raises(ValueError, match="it varies along slope_rms"):
+        pbrdf.signature(both, 0.9, sun=Sun(theta=0.5))
+    alone = pbrdf.signature(both.sel(slope_rms=0.2), 0.9, sun=Sun(theta=0.5))
+    assert_allclose(
+        alone.radiance, pbrdf.signature(traced, 0.9, sun=Sun(theta=0.5)).radiance
+    )

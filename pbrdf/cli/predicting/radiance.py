@@ -9,6 +9,7 @@ import typer
 from pbrdf.cli import option_text, options
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
     import xarray as xr
 
@@ -25,7 +26,8 @@ def command(
     source: Annotated[
         Path,
         typer.Argument(
-            help="Model (.toml) of a fit, or result (.nc) of simulate.", show_default=False
+            help="Model (.toml) of a fit, or result (.nc, .zarr) of simulate.",
+            show_default=False,
         ),
     ],
     view_zenith: Annotated[
@@ -39,9 +41,11 @@ def command(
         typer.Option("--sun-zenith-deg", min=0.0, max=89.9, help="No sun without it."),
     ] = None,
     sun_azimuth: Annotated[
-        float,
-        typer.Option("--sun-azimuth-deg", min=-360.0, max=360.0, help="Of the sun."),
-    ] = 180.0,
+        float | None,
+        typer.Option(
+            "--sun-azimuth-deg", min=-360.0, max=360.0, help="180 degrees without it."
+        ),
+    ] = None,
     time: Annotated[
         str | None,
         typer.Option(
@@ -114,8 +118,6 @@ def command(
 
     Example: pbrdf radiance model.toml --sun-zenith-deg 40 --sky rayleigh --wavelength-um 1
     """
-    import numpy as np
-
     import pbrdf
     from data_io import write_result
     from pbrdf.cli.staging import staged_file
@@ -123,9 +125,10 @@ def command(
 
     waves = option_text.wavelengths(wavelength)
     views = option_text.angles(view_zenith, "--view-zenith-deg", below=90.0)
-    azimuths = np.deg2rad(option_text.numbers(view_azimuth, "--view-azimuth-deg"))
+    azimuths = _azimuths(view_azimuth)
     if time is not None or latitude is not None or longitude is not None:
-        sun_zenith, sun_azimuth = _sun_at(time, latitude, longitude, sun_zenith)
+        angles = sun_zenith, sun_azimuth
+        sun_zenith, sun_azimuth = _sun_at(time, latitude, longitude, angles)
     response = None if band is None else read_response(band)
     sun, skies = _lights(
         sun_zenith=sun_zenith, sun_azimuth=sun_azimuth, sun_irradiance=sun_irradiance,
@@ -135,6 +138,13 @@ def command(
     if sun is None and not skies and temperature is None:
         msg = "radiance needs light: give --sun-zenith-deg, --sky, --temperature-k or more."
         raise ValueError(msg)
+    if sun is not None and sun.relative:
+        _check_relative(
+            {
+                "--temperature-k": temperature, "--sky-radiance": sky_radiance,
+                "--sky-table": sky_table, "--sky-temperature-k": sky_temperature,
+            }
+        )  # fmt: skip
     target = output or source.with_name(f"{source.stem}-radiance.csv")
     if target.suffix not in (".csv", ".nc"):
         msg = f"--output must end in .csv or .nc, got {target.name}."
@@ -160,27 +170,49 @@ def _sun_at(
     time: str | None,
     latitude: float | None,
     longitude: float | None,
-    sun_zenith: float | None,
+    angles: tuple[float | None, float | None],
 ) -> tuple[float, float]:
     """Return zenith and azimuth of the sun at a place and time. [deg]"""
     from math import degrees, radians
 
     from pbrdf.signatures import sun_position
 
-    if time is None or latitude is None or longitude is None or sun_zenith is not None:
+    if time is None or latitude is None or longitude is None or angles != (None, None):
         msg = (
             "--time, --latitude-deg and --longitude-deg must be given together, and "
-            "without --sun-zenith-deg."
+            "without --sun-zenith-deg and --sun-azimuth-deg."
         )
         raise ValueError(msg)
     theta, phi = sun_position(time, radians(latitude), radians(longitude))
     return degrees(theta), degrees(phi)
 
 
+def _azimuths(text: str) -> "np.ndarray":
+    """Return azimuths of the sensor. [rad]"""
+    import numpy as np
+
+    degrees = np.array(option_text.numbers(text, "--view-azimuth-deg"))
+    for one in degrees[np.abs(degrees) > 720.0]:
+        msg = f"--view-azimuth-deg must lie in [-720, 720] degrees, got {one:g}."
+        raise ValueError(msg)
+    return np.deg2rad(degrees)
+
+
+def _check_relative(absolute: dict[str, Any]) -> None:
+    """Refuse light in units of power beside a sun of irradiance 1."""
+    for option, given in absolute.items():
+        if given is not None:
+            msg = (
+                "--sun-irradiance or --planck-sun must be given where other light is in "
+                f"W/(m2 sr um), as by {option}."
+            )
+            raise ValueError(msg)
+
+
 def _lights(
     *,
     sun_zenith: float | None,
-    sun_azimuth: float,
+    sun_azimuth: float | None,
     sun_irradiance: float | None,
     planck_sun: bool,
     optical_depth: float | None,
@@ -204,6 +236,7 @@ def _lights(
     _check_pairs(
         {
             "--sun-irradiance": (sun_irradiance, "--sun-zenith-deg", sun_zenith),
+            "--sun-azimuth-deg": (sun_azimuth, "--sun-zenith-deg", sun_zenith),
             "--planck-sun": (planck_sun or None, "--sun-zenith-deg", sun_zenith),
             "--sky rayleigh": (
                 sky if sky is Clear.rayleigh else None, "--sun-zenith-deg", sun_zenith
@@ -230,7 +263,8 @@ def _lights(
     sun: Sun | None = None
     skies: list[Any] = []
     if sun_zenith is not None:
-        place = {"theta": radians(sun_zenith), "phi": radians(sun_azimuth)}
+        azimuth = 180.0 if sun_azimuth is None else sun_azimuth
+        place = {"theta": radians(sun_zenith), "phi": radians(azimuth)}
         if planck_sun:
             sun = Sun.planck(**place, optical_depth=depth)
         else:
@@ -258,11 +292,18 @@ def _read(source: Path) -> Any:
     """Read a model or a result by the end of its name."""
     from data_io import read_model, read_result
     from pbrdf.files import read_toml
+    from pbrdf.stored.whole import is_sweep_store
 
-    if source.suffix == ".nc":
+    if is_sweep_store(source):
+        msg = (
+            f"source must be one surface, {source.name} is the store of a sweep. Take one "
+            "in Python: pbrdf.signature(pbrdf.from_store(path).at(...), ...)."
+        )
+        raise ValueError(msg)
+    if source.suffix in (".nc", ".zarr"):
         return read_result(source)
     if source.suffix != ".toml":
-        msg = f"source must be a model (.toml) or a result (.nc), got {source.name}."
+        msg = f"source must be a model (.toml) or a result (.nc, .zarr), got {source.name}."
         raise ValueError(msg)
     tables = read_toml(source)
     # The model of a pipeline notes the statistics of its surface
