@@ -9,6 +9,8 @@ from pbrdf.errors import real_array
 
 STOKES = ("I", "Q", "U", "V")
 BOUNCES = ("1", "2", "3+")
+# Variables of a result that hold light of which nobody knows where it went
+LOSSES = ("truncated", "leaked", "left_sideways")
 
 
 class Variable(NamedTuple):

@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import xarray as xr
 
+from pbrdf.conventions import LOSSES
 from pbrdf.errors import AccuracyWarning
 from pbrdf.signatures.result_surface import ResultSurface, SunlitResult
 from pbrdf.signatures.sun import Sun
@@ -13,7 +14,6 @@ __all__ = ["Result"]
 
 # Lost light above this share of the incident light is warned of
 MOST_LOST = 1e-3
-_LOSSES = ("truncated", "leaked", "left_sideways")
 
 
 class Result:
@@ -147,7 +147,9 @@ class Result:
 
     @staticmethod
     def _check_losses(chosen: xr.Dataset) -> None:
-        lost = float(sum(chosen[name] for name in _LOSSES if name in chosen))
+        lost = float(sum(chosen[name] for name in LOSSES if name in chosen))
+        # Of a surface between those of a store
+        lost = max(lost, float(chosen.attrs.get("most_lost", 0.0)))
         if lost > MOST_LOST:
             msg = (
                 f"{100 * lost:.2g} % of the light was lost in the simulation and counts as "

@@ -1,5 +1,6 @@
 """What the store of a sweep holds: its axes in the words of Python, and its points."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pbrdf.conventions import LOSSES
 from pbrdf.files.stores import check_store
 from pbrdf.stored.parameters import Cloud, Parameter
 
@@ -17,6 +19,8 @@ _BOUND = "pbrdf_sweep"
 _DONE = 1
 _UNITS = {"_deg": ("rad", np.pi / 180), "_um": ("um", 1.0)}
 _OWN = ("theta_i", "theta_s", "dphi", "stokes_out", "stokes_in")
+# Points of a sample about a place whose losses count
+NEAREST_LOST = 8
 # Numbers between which nothing lies
 _APART = ("seed", "n_rays", "realizations", "max_bounces", "phi_i")
 
@@ -58,6 +62,13 @@ class Contents:
                 factor = next(
                     (f for end, (_, f) in _UNITS.items() if name.endswith(end)), 1.0
                 )
+            alone = self.dataset.coords.get("wavelength")
+            if known is None and name == "wavelength" and alone is not None:
+                msg = (
+                    f"wavelength must be {float(alone):.6g} um, the only one of the store, "
+                    f"got {value}. Sweep others."
+                )
+                raise ValueError(msg)
             if known is None:
                 held = ", ".join(self.parameters) or "none but the angles"
                 msg = f"the store must have the axis {name!r}, it has {held}."
@@ -125,6 +136,33 @@ class Contents:
             here.brdf_total.transpose(*order).to_numpy(),
             here.brdf_total_stderr.transpose(*order).to_numpy(),
         )
+
+    def source_azimuth(self, values: Mapping[str, Any]) -> float | str:
+        """Azimuth of the source [rad], or "uniform"."""
+        if "phi_i" in values:
+            return float(values["phi_i"])
+        run = json.loads(self.dataset.attrs["sweep"])["simulate"]
+        told = run.get("phi_i_deg", "uniform")
+        return told if isinstance(told, str) else float(np.deg2rad(np.ravel(told)[0]))
+
+    def most_lost(self, values: Mapping[str, Any]) -> float:
+        """Largest share of light that was lost at the points about a place, as of `named`.
+
+        Cut off, leaked or gone sideways; what is lost counts as emitted.
+        """
+        held = [name for name in LOSSES if name in self.dataset]
+        about: dict[str, Any] = {}
+        apart: tuple[str, ...] = ()
+        if self.cloud is not None:
+            apart = self.cloud.names
+            place = np.array([float(values[name]) for name in apart])
+            near = self.cloud.nearest(place, NEAREST_LOST)
+            about["point"] = self.cloud.index[near]
+        for name, one in self.parameters.items():
+            if name not in apart:
+                about[one.dim] = one.around(values[name])
+        lost = [self.dataset[name].isel(about).to_numpy() for name in held]
+        return float(np.sum(lost, axis=0).max())
 
     def _check_done(self, here: xr.Dataset) -> None:
         state = here.state.load()

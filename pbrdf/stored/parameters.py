@@ -66,6 +66,9 @@ class Parameter:
                 f"which were computed, got {value!r}."
             )
             raise ValueError(msg)
+        if not isinstance(value, int | float | np.number):
+            msg = f"{self.name} must be a number, got {str(value)!r}."
+            raise ValueError(msg)
         low, high = self.ends
         slack = 1e-9 * max(abs(low), abs(high))
         if not low - slack <= float(value) <= high + slack:
@@ -75,6 +78,20 @@ class Parameter:
             )
             raise ValueError(msg)
         return min(max(float(value), low), high)
+
+    def around(self, values: Any) -> list[int]:
+        """Return the numbers of the nodes about values that `check` lets pass."""
+        if not self.number:
+            each = np.ravel(values)
+            return [
+                k
+                for k, one in enumerate(self.nodes)
+                if any(self._same(one, v) for v in each)
+            ]
+        each = np.array([self.check(value) for value in np.ravel(values)])
+        first = max(int(np.searchsorted(self.nodes, each.min(), "right")) - 1, 0)
+        last = int(np.searchsorted(self.nodes, each.max(), "left"))
+        return list(range(first, last + 1))
 
     def _same(self, one: Any, value: Any) -> bool:
         if self.nodes.dtype.kind != "f":

@@ -28,7 +28,8 @@ class StoredBRDF:
     `brdf`, `stderr` and `error` take the angles, the wavelength where the store has
     several, and what the sweep varied by its name without unit: angles in radians, lengths
     in um.
-    All are broadcast; those of which the store has one value may be left out.
+    All are broadcast; those of which the store has one value may be left out. The specular
+    beam of a sweep with waves is none of it: read `coherent` of the store.
 
     Examples
     --------
@@ -167,8 +168,13 @@ class StoredBRDF:
             brdf_total, its standard error, and albedo_stderr: that of the sum over the
             hemisphere if errors of interpolation are alike everywhere and those of the
             simulation independent. The attribute `interpolated_along` names the axes whose
-            values were not computed.
+            values were not computed; `most_lost` is the largest share of light that was
+            lost at the points about it, `phi_i` the azimuth of the source.
         """
+        for parameter, one in parameters.items():
+            if np.ndim(one):
+                msg = f"{parameter} must be one value, got {one!r}. Call at() for each."
+                raise ValueError(msg)
         data = self._contents.dataset
         incidences = np.atleast_1d(self._theta_i if theta_i is None else theta_i)
         known = self._contents.parameters.get("wavelength")
@@ -212,9 +218,14 @@ class StoredBRDF:
         )
         out.attrs = {"store": self._contents.path.name, "interpolated_at": told}
         place = parameters if waves is None else parameters | {"wavelength": each}
-        along = self._contents.between(incidences, self._contents.named(place))
+        named = self._contents.named(place)
+        along = self._contents.between(incidences, named)
         out.attrs["interpolated_along"] = ", ".join(along)
         out.attrs["stderr_excludes_interpolation"] = not interpolated
+        # What a signature asks of a result beside its bins
+        out.attrs["phi_i"] = self._contents.source_azimuth(named)
+        out.attrs["most_lost"] = self._contents.most_lost(named)
+        out.attrs["without_beam"] = "coherent" in data
         return out
 
     def plot(

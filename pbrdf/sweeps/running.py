@@ -50,7 +50,7 @@ def run_sweep(
         Compute part i of n only, i from 1, for job arrays without a scheduler. All parts
         may run at once.
     replace : bool
-        Begin anew, also in place of the store of another sweep.
+        Begin anew, also in place of the store of another sweep; not with part.
     progress : callable, optional
         Called with (groups done, groups in all).
 
@@ -65,9 +65,7 @@ def run_sweep(
     OSError
         If the disk is full.
     """
-    if part is not None and not 1 <= part[0] <= part[1]:
-        msg = f"part must be i of n with i from 1 to n, got {part[0]}/{part[1]}."
-        raise ValueError(msg)
+    _check_part(part, replace=replace)
     cores = worker_count(workers)
     store = open_store(path, sweep, replace=replace)
     mine = range(store.layout.n_groups)
@@ -104,6 +102,20 @@ def run_sweep(
                     by_client(own, sweep, store, left, report, told, cores=cores)
     store.tell_warnings()
     return report
+
+
+def _check_part(part: tuple[int, int] | None, *, replace: bool) -> None:
+    if part is None:
+        return
+    if not 1 <= part[0] <= part[1]:
+        msg = f"part must be i of n with i from 1 to n, got {part[0]}/{part[1]}."
+        raise ValueError(msg)
+    if replace:
+        msg = (
+            "replace must be False with part, it would delete what the other parts have "
+            "computed. Delete the store before the first of them."
+        )
+        raise ValueError(msg)
 
 
 def _serial(

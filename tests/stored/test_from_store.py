@@ -148,12 +148,60 @@ def test_a_surface_of_the_store_under_the_sun(store: Path) -> None:
     assert float(error[..., 0].max()) < 0.15 * float(wanted.radiance[..., 0].max())
 
 
+SMALL = (
+    SWEEP.replace("n_rays = 2000", "n_rays = 100")
+    .replace("= 30", "= 6")
+    .replace("n_dphi = 60", "n_dphi = 8")
+    .replace("[0.12, 0.16, 0.22, 0.3]", "[0.1, 0.7]")
+)
+
+
+def small(folder: Path, more: str) -> pbrdf.stored.source.StoredBRDF:
+    (folder / "scene.toml").write_text(SCENE)
+    (folder / "sweep.toml").write_text(SMALL + more)
+    run_sweep(load_sweep(folder / "sweep.toml"), folder / "s.zarr", workers=1)
+    return pbrdf.from_store(folder / "s.zarr")
+
+
+def test_a_surface_of_the_store_tells_what_it_lost_and_where_it_was_lit(
+    tmp_path: Path,
+) -> None:
+    """Cut after one bounce, steep slopes lose light, which a warm surface would emit."""
+    source = small(tmp_path, "max_bounces = 1\nphi_i_deg = 20\n")
+    view = np.deg2rad(55.0)
+    warm = {"temperature": 300.0, "wavelength": 10.0, "phi_s": np.deg2rad(20.0)}
+    whole = xr.open_zarr(tmp_path / "s.zarr").truncated
+    at = {"n": 1.6, "interpolated": False}
+    steep, flat = source.at(slope_rms=0.7, **at), source.at(slope_rms=0.1, **at)
+    for one, slope in ((steep, 0.7), (flat, 0.1)):
+        lost = whole.sel(slope_rms=slope, n=[1.5, 1.7]).max()
+        assert one.attrs["most_lost"] == pytest.approx(float(lost), rel=1e-9)
+    assert flat.attrs["most_lost"] < 1e-3 < steep.attrs["most_lost"]
+    with pytest.warns(pbrdf.AccuracyWarning, match="% of the light was lost"):
+        pbrdf.signature(steep, view, **warm)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        pbrdf.signature(flat, view, **warm)
+    with pytest.warns(pbrdf.AccuracyWarning, match="traced at the azimuth 20 deg"):
+        pbrdf.signature(flat, view, **warm | {"phi_s": 0.0})
+
+
+def test_a_surface_without_its_beam_has_no_signature(tmp_path: Path) -> None:
+    source = small(tmp_path, 'wave = "auto"\nwavelength_um = 0.9\n')
+    one = source.at(slope_rms=0.1, n=1.5, interpolated=False)
+    with pytest.raises(ValueError, match="must hold its specular beam"):
+        pbrdf.signature(one, np.deg2rad(55.0), sun=pbrdf.signatures.Sun(theta=0.5))
+    with pytest.raises(ValueError, match=r"n must be one value, got \[1\.4, 1\.5\]"):
+        source.at(slope_rms=0.1, n=[1.4, 1.5])
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
         ({"slope_rms": 0.31, "n": 1.5}, "slope_rms must lie in the store's 0.12 to 0.3"),
         ({"slope_rms": 0.2}, "n must be given, the store has it from 1.4 to 1.7"),
         ({"slope_rms": 0.2, "n": 1.5, "q": 0.1}, "must have the axis 'q', it has slope"),
+        ({"slope_rms": "rough", "n": 1.5}, "slope_rms must be a number, got 'rough'"),
         ({"slope_rms": 0.2, "n": np.nan}, "n must lie in the store's 1.4 to 1.7, got nan"),
     ],
 )  # fmt: skip
@@ -220,12 +268,12 @@ def test_degrees_and_names_of_the_file_are_understood(tmp_path: Path) -> None:
     assert_allclose(
         source.brdf(theta_i, 0.5, np.pi, 0.55, material="bk7", corr_length=5.0), one
     )
-    with pytest.raises(ValueError, match="wavelength"):
+    with pytest.raises(ValueError, match=r"wavelength must be 0\.55 um, .* got 0\.6"):
         source.brdf(theta_i, 0.5, np.pi, 0.6, material="bk7", corr_length=5.0)
     between = source.at(material="bk7", corr_length_um=5.0)
     assert between.attrs["interpolated_along"] == "corr_length"
     figure = hemisphere(between, ("M00",), fold=False)
-    assert "corr_length_um = 5.0 (interpolated along corr_length)" in figure.get_suptitle()
+    assert "corr_length_um = 5 (interpolated along corr_length)" in figure.get_suptitle()
     other = source.brdf(theta_i, 0.5, np.pi, material="bk7", corr_length_um=5.0)
     assert_allclose(one, other, rtol=1e-14)
     assert (source.error(theta_i, 0.5, np.pi, material="bk7", corr_length=5.0)[0, 0]) > 0

@@ -98,6 +98,10 @@ def test_parts_make_the_whole(whole: Path, tmp_path: Path) -> None:
     xr.testing.assert_identical(opened(path), opened(whole / "s.zarr"))
     with pytest.raises(ValueError, match=r"part must be i of n .* got 5/4"):
         run_sweep(sweep, path, part=(5, 4))
+    # Each part would delete the others
+    with pytest.raises(ValueError, match="replace must be False with part"):
+        run_sweep(sweep, path, part=(1, 4), replace=True)
+    assert run_sweep(sweep, path, part=(1, 4)).computed == 0
 
 
 def test_another_sweep_and_other_folders_are_refused(whole: Path, tmp_path: Path) -> None:

@@ -99,6 +99,12 @@ def command(
             raise ValueError(msg)
         report = _one_file(context, sweep, target_path)
     else:
+        if part and force:
+            msg = (
+                "--force must be left out with --part, it would delete what the other "
+                f"parts have computed. Delete {target_path.name} before the first of them."
+            )
+            raise ValueError(msg)
         report = _store(sweep, target_path, workers, scheduler, _part(part), force)
     _tell(report)
     what = "simulations" if target_path.suffix == ".nc" else "groups computed"
