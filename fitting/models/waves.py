@@ -165,6 +165,12 @@ class WaveSurface:
         found[..., 0, 0] += self.diffuse_albedo / np.pi
         return found
 
+    def coherent(
+        self, theta_i: npt.ArrayLike, wavelength: Any, *, phi_i: npt.ArrayLike = 0.0
+    ) -> np.ndarray:
+        """Mueller matrix of the specular beam, which the gain dims too, (..., 4, 4). [1]"""
+        return self.specular_gain * self.model.coherent(theta_i, wavelength, phi_i=phi_i)
+
     @property
     def beside(self) -> dict[str, float]:
         """Gain and albedo, which stand beside the model."""

@@ -83,12 +83,7 @@ class Prediction:
         ndarray, shape (..., 4, 4)
             [1/sr]
         """
-        if wavelength is not None and wavelength != self.wavelength:
-            msg = (
-                f"wavelength must be that of the prediction, {self.wavelength:g} um, got "
-                f"{wavelength:g}. Predict anew: patches depend on it."
-            )
-            raise ValueError(msg)
+        self._check(wavelength)
         angles = (theta_i, theta_s, dphi)
         once = self.model.brdf(*angles, self.wavelength, phi_i=phi_i)
         return once + self._twice(angles, phi_i)
@@ -112,11 +107,26 @@ class Prediction:
         low, high = np.quantile(np.concatenate(values, axis=-1), ends, axis=-1)
         return low, high
 
-    def coherent(self, theta_i: npt.ArrayLike) -> Array:
-        """Mueller matrix of the specular beam, (..., 4, 4) [1]; 0 of a map of facets."""
+    def coherent(
+        self, theta_i: npt.ArrayLike, wavelength: float | None = None,
+        *, phi_i: npt.ArrayLike = 0.0,
+    ) -> Array:  # fmt: skip
+        """Mueller matrix of the specular beam, (..., 4, 4) [1]; 0 of a map of facets.
+
+        Arguments as of `brdf`.
+        """
+        self._check(wavelength)
         if isinstance(self.model, WaveModel):
-            return self.model.coherent(theta_i, self.wavelength)
-        return np.zeros((*np.shape(theta_i), 4, 4))
+            return self.model.coherent(theta_i, self.wavelength, phi_i=phi_i)
+        return np.zeros((*np.broadcast_shapes(np.shape(theta_i), np.shape(phi_i)), 4, 4))
+
+    def _check(self, wavelength: float | None) -> None:
+        if wavelength is not None and wavelength != self.wavelength:
+            msg = (
+                f"wavelength must be that of the prediction, {self.wavelength:g} um, got "
+                f"{wavelength:g}. Predict anew: patches depend on it."
+            )
+            raise ValueError(msg)
 
     def _twice(self, angles: tuple[npt.ArrayLike, ...], phi_i: npt.ArrayLike) -> Array:
         theta_i, theta_s, dphi = angles

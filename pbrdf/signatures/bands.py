@@ -124,6 +124,10 @@ def _checked(response: Any) -> tuple[np.ndarray, np.ndarray]:
         "response", response[1], lambda v: (v >= 0) & np.isfinite(v), "be finite and >= 0",
         "It is a share of the light.",
     )  # fmt: skip
+    twice = waves[1:][np.diff(waves) == 0] if waves.ndim == 1 else waves[:0]
+    if twice.size:
+        msg = f"response must have each wavelength once, got {twice[0]:g} um twice."
+        raise ValueError(msg)
     if waves.ndim != 1 or waves.shape != values.shape or (np.diff(waves) <= 0).any():
         msg = (
             "response must be (wavelengths, values) of one length with rising wavelengths, "

@@ -101,9 +101,10 @@ def _dolp(light: xr.DataArray, stderr: xr.DataArray) -> tuple[xr.DataArray, xr.D
 
 def _check_pair(target: xr.Dataset, background: xr.Dataset) -> None:
     for name, one in (("target", target), ("background", background)):
-        if "radiance" not in one or "radiance_stderr" not in one:
-            msg = f"{name} must be a signature, it lacks radiance. Use pbrdf.signature."
-            raise ValueError(msg)
+        for needed in ("radiance", "radiance_stderr"):
+            if needed not in one:
+                msg = f"{name} must be a signature, it lacks {needed}. Use pbrdf.signature."
+                raise ValueError(msg)
     try:
         xr.align(target, background, join="exact")
     except ValueError as error:

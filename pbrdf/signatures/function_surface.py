@@ -1,5 +1,6 @@
 """A surface whose BRDF is a function of the geometry, looked at from one direction."""
 
+import inspect
 from collections.abc import Callable
 from math import pi
 from typing import Any
@@ -25,8 +26,9 @@ class FunctionSurface:
     Parameters
     ----------
     source : object
-        With `brdf(theta_i, theta_s, dphi[, wavelength])` as `MicrofacetModel`; with
-        `coherent(theta_i, wavelength)` where part of the light stays a specular beam.
+        With `brdf(theta_i, theta_s, dphi[, wavelength, phi_i])` as `MicrofacetModel`; with
+        `coherent(theta_i, wavelength[, phi_i])` where part of the light stays a specular
+        beam.
     theta, phi : float
         Direction to the sensor. [rad]
     wavelength : float or None
@@ -45,17 +47,13 @@ class FunctionSurface:
         wavelength: float | None,
         rel_error: float,
     ) -> None:
-        from pbrdf.analytic.microfacet import MicrofacetModel
-        from pbrdf.wave import WaveModel
-
         self.source = source
         self.theta, self.phi, self.wavelength = theta, phi, wavelength
         self.rel_error = rel_error
-        # Only this model depends on where the x axis of the surface lies
-        self.oriented = isinstance(source, MicrofacetModel | WaveModel)
+        self.asked = _asked(source.brdf, wavelength)
         self.beam = np.zeros((4, 4))
         if hasattr(source, "coherent"):
-            more = {"phi_i": phi} if isinstance(source, WaveModel) else {}
+            more = {"phi_i": phi} if "phi_i" in _asked(source.coherent, wavelength) else {}
             self.beam = np.asarray(source.coherent(theta, wavelength, **more))
 
     def facing(self, sun: Sun, irradiance: float) -> Value:
@@ -98,11 +96,16 @@ class FunctionSurface:
         return BLACK - EXCHANGED * (row + self.beam[0]), error
 
     def _brdf(self, theta_i: Any, theta_s: Any, dphi: Any, phi_i: Any) -> np.ndarray:
-        more: dict[str, Any] = {"phi_i": np.mod(phi_i, 2 * pi)} if self.oriented else {}
-        if self.wavelength is not None:
-            more["wavelength"] = self.wavelength
-        turned = np.mod(dphi, 2 * pi)
-        return np.asarray(self.source.brdf(theta_i, theta_s, turned, **more))
+        known = {"phi_i": np.mod(phi_i, 2 * pi), "wavelength": self.wavelength}
+        more = {name: known[name] for name in self.asked}
+        found = np.asarray(self.source.brdf(theta_i, theta_s, np.mod(dphi, 2 * pi), **more))
+        if found.shape[-2:] != (4, 4):
+            msg = (
+                "brdf of the source must return (..., 4, 4) Mueller matrices [1/sr], got "
+                f"shape {found.shape}."
+            )
+            raise ValueError(msg)
+        return found
 
     def _hemisphere(
         self, function: Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -130,6 +133,23 @@ class FunctionSurface:
             )  # fmt: skip
             total, error = total + found.estimate, error + np.abs(found.error)
         return total, error
+
+
+def _asked(function: Callable[..., Any], wavelength: float | None) -> tuple[str, ...]:
+    """Return what a function takes beside its angles: wavelength and azimuth."""
+    takes = inspect.signature(function).parameters
+    asked = ("phi_i",) if "phi_i" in takes else ()
+    wave = takes.get("wavelength")
+    if wavelength is None:
+        if wave is not None and wave.default is wave.empty:
+            msg = (
+                "wavelength must be given, the source depends on it. Pass wavelength=0.55."
+            )
+            raise ValueError(msg)
+        return asked
+    # What passes all on may pass it on to one that asks for it
+    anything = any(one.kind is one.VAR_KEYWORD for one in takes.values())
+    return (*asked, "wavelength") if wave is not None or anything else asked
 
 
 def mirrored_sun(

@@ -1,15 +1,18 @@
 """Radiance of a black body, and spectra as users give them."""
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from pbrdf.errors import one_number, require
+from pbrdf.errors import AccuracyWarning, one_number, require
 
-__all__ = ["Spectrum", "black_body", "checked_temperature", "spectral"]
+__all__ = ["Spectrum", "black_body", "checked_temperature", "spectral", "tell_cold"]
 
+# A number below was meant in degrees Celsius, or on the moon by night, or in space [K]
+COLD = 100.0
 # One number, (wavelengths, values), or a function of the wavelength [um]
 Spectrum = float | tuple[npt.ArrayLike, npt.ArrayLike] | Callable[[float], float]
 
@@ -53,6 +56,16 @@ def checked_temperature(name: str, temperature: Any) -> float:
         name, temperature, lambda v: (v > 0) & (v < 1e6), "lie in (0, 1e6) K",
         "Temperatures are kelvins.",
     )  # fmt: skip
+
+
+def tell_cold(temperature: float) -> None:
+    """Warn of a temperature [K] that looks like one in degrees Celsius."""
+    if temperature < COLD:
+        msg = (
+            f"temperature is {temperature:g} K. Temperatures are kelvins: add 273.15 to "
+            "degrees Celsius."
+        )
+        warnings.warn(msg, AccuracyWarning, stacklevel=4)
 
 
 def spectral(name: str, spectrum: Spectrum, wavelength: float | None) -> float:

@@ -71,6 +71,9 @@ class RayleighSky:
     depolarisation: float = 0.0279
 
     def __post_init__(self) -> None:
+        if not isinstance(self.sun, Sun):
+            msg = f"sun must be a pbrdf.signatures.Sun, got {type(self.sun).__name__}."
+            raise TypeError(msg)
         one_number(
             "depolarisation", self.depolarisation, lambda v: (v >= 0) & (v < 1),
             "lie in [0, 1) [1]", "That of air is 0.0279.",

@@ -1,6 +1,5 @@
 """Stokes radiance at a sensor: sun, sky and own warmth, put together."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 from itertools import product
 from math import pi
@@ -12,9 +11,9 @@ import xarray as xr
 
 from pbrdf._version import __version__
 from pbrdf.conventions import STOKES
-from pbrdf.errors import AccuracyWarning, require
+from pbrdf.errors import require
 from pbrdf.signatures.function_surface import BLACK, FunctionSurface
-from pbrdf.signatures.planck import black_body, checked_temperature
+from pbrdf.signatures.planck import black_body, checked_temperature, tell_cold
 from pbrdf.signatures.result_surface import ResultSurface, SunlitResult
 from pbrdf.signatures.results import Result
 from pbrdf.signatures.skies import Sky
@@ -22,8 +21,6 @@ from pbrdf.signatures.sun import Sun
 
 __all__ = ["signature"]
 
-# A number below was meant in degrees Celsius, or on the moon by night [K]
-COLD = 100.0
 ABSOLUTE, RELATIVE = "W m-2 sr-1 um-1", "sr-1"
 LONG_NAMES = {
     "radiance": "Stokes radiance at the sensor",
@@ -111,12 +108,7 @@ def signature(  # noqa: PLR0913  (the public signature)
     _check_light(sun, skies, temperature)
     if temperature is not None:
         temperature = checked_temperature("temperature", temperature)
-        if temperature < COLD:
-            msg = (
-                f"temperature is {temperature:g} K. Temperatures are kelvins: add 273.15 "
-                "to degrees Celsius."
-            )
-            warnings.warn(msg, AccuracyWarning, stacklevel=2)
+        tell_cold(temperature)
     result = _as_result(source, views, waves, simulation)
     if result is not None:
         waves = result.waves if waves is None else waves

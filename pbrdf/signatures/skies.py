@@ -10,7 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from pbrdf.errors import AccuracyWarning, DataFileError, require
-from pbrdf.signatures.planck import Spectrum, black_body, checked_temperature, spectral
+from pbrdf.signatures.planck import (
+    Spectrum,
+    black_body,
+    checked_temperature,
+    spectral,
+    tell_cold,
+)
 
 __all__ = ["OvercastSky", "Sky", "SkyTable", "ThermalSky", "read_sky"]
 
@@ -79,7 +85,7 @@ class ThermalSky:
     optical_depth: Spectrum | None = None
 
     def __post_init__(self) -> None:
-        checked_temperature("temperature", self.temperature)
+        tell_cold(checked_temperature("temperature", self.temperature))
 
     def stokes(
         self, theta: npt.ArrayLike, phi: npt.ArrayLike, wavelength: float | None

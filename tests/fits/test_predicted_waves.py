@@ -5,9 +5,12 @@ import pytest
 from typer.testing import CliRunner
 
 import fitting
+import pbrdf
+from fitting.models.waves import WaveSurface
 from fitting.prediction.waves import density_of
 from pbrdf import GaussianSurface, HeightMap, Material, MicrofacetModel, WaveModel
 from pbrdf.cli.app import app
+from pbrdf.signatures import Sun
 
 WAVE, HEIGHT, LENGTH = 0.65, 0.04, 1.5
 SURFACE = GaussianSurface(
@@ -36,6 +39,16 @@ def test_a_smooth_map_scatters_by_its_spectrum(periodic):
     beam = found.coherent([0.2, 0.9])
     share = 0.06 if periodic else 0.2
     assert np.allclose(beam, TRUTH.coherent([0.2, 0.9], WAVE), atol=share * beam[0, 0, 0])
+    # The disc of the sun in it is that beam, of its azimuth
+    sun = Sun(theta=0.9, phi=0.7)
+    seen = pbrdf.signature(found, 0.9, phi_s=0.7 + np.pi, sun=sun)
+    disc = np.pi * np.sin(sun.half_angle) ** 2
+    alone = found.coherent(0.9, phi_i=0.7)[:, 0]
+    assert np.allclose(seen.radiance * disc, alone, atol=0.01 * alone[0])
+    fitted = WaveSurface(model=TRUTH, specular_gain=0.5)
+    half = pbrdf.signature(fitted, 0.9, phi_s=0.7 + np.pi, sun=sun, wavelength=WAVE)
+    whole = TRUTH.coherent(0.9, WAVE)[:, 0]
+    assert np.allclose(half.radiance * disc, 0.5 * whole, atol=0.005 * whole[0])
     facets = fitting.predict(
         drawn(periodic=True), Material(1.5), wavelength=WAVE, wave=False
     )

@@ -58,6 +58,7 @@ def test_a_narrow_band_is_one_wavelength() -> None:
         (([0.5, 0.45], [1.0, 1.0]), "rising wavelengths"),
         (([0.5, 0.6], [1.0, -1.0]), "response must be finite and >= 0, got -1"),
         (([0.5, 0.6], [0.0, 0.0]), "not be 0"),
+        (([0.5, 0.6, 0.6], [1.0, 1.0, 0.0]), "each wavelength once, got 0.6 um twice"),
     ],
 )
 def test_responses_that_do_not_fit_are_refused(response: tuple, message: str) -> None:

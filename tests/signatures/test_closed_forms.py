@@ -331,6 +331,46 @@ def test_the_beam_of_grooves_depends_on_the_azimuth() -> None:
     assert_allclose(seen.radiance * disc, beam, rtol=0, atol=1e-3)
 
 
+class Grooved:
+    """A surface of no wavelength whose BRDF goes as 1 + cos(2 phi_i)/2."""
+
+    def brdf(
+        self, theta_i: object, theta_s: object, dphi: object, *, phi_i: object = 0.0
+    ) -> np.ndarray:
+        shape = np.broadcast_shapes(*map(np.shape, (theta_i, theta_s, dphi, phi_i)))
+        found = np.zeros((*shape, 4, 4))
+        found[..., 0, 0] = 0.1 * (1.0 + 0.5 * np.cos(2 * np.asarray(phi_i)))
+        return found
+
+
+def test_sources_of_others_are_asked_for_what_they_take() -> None:
+    """The azimuth where they know it, no wavelength where they do not."""
+    sun = Sun(theta=0.6, phi=0.4, irradiance=100.0)
+    seen = pbrdf.signature(
+        Grooved(), 0.5, phi_s=2.0, wavelength=10.0, temperature=300.0, sun=sun
+    )  # fmt: skip
+    lit = 10.0 * cos(0.6) * (1.0 + 0.5 * cos(0.8))
+    assert_allclose(seen.reflected_sun[0], lit, rtol=1e-4)
+    assert_allclose(seen.emissivity[0], 1 - 0.1 * pi * (1 + 0.5 * cos(4.0)), rtol=1e-5)
+
+
+def test_sources_that_cannot_be_asked_are_named() -> None:
+    class Scalar:
+        def brdf(self, theta_i: object, theta_s: object, dphi: object) -> float:
+            return 0.1
+
+    waves = pbrdf.WaveModel(Material(1.5), height_rms=0.02, corr_length=2.0)
+    with pytest.raises(ValueError, match=r"must return \(\.\.\., 4, 4\) Mueller matrices"):
+        pbrdf.signature(Scalar(), 0.5, sun=Sun(theta=0.3))
+    with pytest.raises(ValueError, match="wavelength must be given, the source depends"):
+        pbrdf.signature(waves, 0.5, sun=Sun(theta=0.3))
+    with pytest.raises(TypeError, match="sun must be a"):
+        RayleighSky(sun=0.3)
+    seen = pbrdf.signature(WHITE, 0.5, sun=Sun(theta=0.3))
+    with pytest.raises(ValueError, match=r"background .* lacks radiance_stderr"):
+        contrast(seen, seen.drop_vars("radiance_stderr"))
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -352,6 +392,11 @@ def test_a_sensor_in_degrees_is_refused() -> None:
         pbrdf.signature(PAINT, 30.0, sun=Sun(theta=0.3))
     with pytest.raises(ValueError, match="theta must lie in"):
         Sun(theta=60.0)
+
+
+def test_a_sky_in_degrees_celsius_is_told() -> None:
+    with pytest.warns(AccuracyWarning, match="7 K. Temperatures are kelvins: add 273.15"):
+        ThermalSky(temperature=7.0)
 
 
 def test_a_temperature_in_degrees_celsius_is_told():
