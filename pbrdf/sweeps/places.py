@@ -64,6 +64,9 @@ def resolve(name: str, document: Mapping[str, Any], run_keys: tuple[str, ...]) -
             f"{name} must name one value of the scene, got {listed}. Write the whole path."
         )
         raise ValueError(msg)
+    if name.rpartition(".")[2] == "type":
+        msg = f"{name} cannot vary: keys depend on it. Make a sweep of each type."
+        raise ValueError(msg)
     near = get_close_matches(name, [*by_name, *{str(p[-1]) for p in known}], 4, 0.5)
     if not near:
         near = [place for place, path in by_name.items() if known[path]]

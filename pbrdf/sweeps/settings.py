@@ -46,7 +46,7 @@ def arguments(table: Mapping[str, Any]) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If a key is unknown, or no number where one is needed.
+        If a key is unknown, no number where one is needed, or an incidence is none.
     """
     unknown = [key for key in table if key not in _KEYS]
     if unknown:
@@ -67,4 +67,7 @@ def _in_unit(key: str, value: Any) -> Any:
     except (TypeError, ValueError) as error:
         msg = f"[simulate]: {key} must be numbers, got {value!r}."
         raise ValueError(msg) from error
+    if key == "theta_i_deg" and not np.all((numbers >= 0) & (numbers < 90)):
+        msg = f"[simulate]: {key} must lie in [0, 90), got {value!r}."
+        raise ValueError(msg)
     return (numbers * unit).tolist()

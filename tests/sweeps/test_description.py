@@ -111,6 +111,12 @@ def test_sampled_designs_fill_their_ranges(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize(
     ("lines", "more", "told"),
     [
+        (
+            "theta_i_deg = [20, 90]\nn = [1.4]",
+            "",
+            "theta_i_deg must lie in [0, 90), got [20, 90]",
+        ),
+        ('"surface.type" = ["gaussian"]', "", "surface.type cannot vary"),
         ("slope_rsm = [0.1]", "", "slope_rms"),
         ('"contaminants[0].coverage" = [0.1]', "", "must be the path"),
         ("n = [1.4, -1.0]", "", "n must be"),
