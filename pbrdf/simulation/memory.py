@@ -151,8 +151,9 @@ def at_work(scene: Scene, size: Size, effort: Effort, *, among: int | None = Non
     mapped = surface if clean and isinstance(surface, HeightMap) else None
     if effort.looks and (drawn_anew or mapped is not None):
         sights = _sights(size)
-        if drawn_anew:
-            sights += size.angles * size.azimuths * most_bytes(size.bins // LEAST_THETA)
+        if isinstance(surface, GaussianSurface) and not batched:
+            lines = most_bytes(surface, size.bins // LEAST_THETA)
+            sights += size.angles * size.azimuths * lines
         if mapped is not None:
             # What the points of each facet tell, and looks of each batch
             sights += 2.0 * mapped.heights.size * size.angles * size.azimuths

@@ -36,6 +36,16 @@ def _ways(first: float, step: float, last: float) -> np.ndarray:
     return np.concatenate([near, np.arange(beyond + 2.0 * step, last, 2.0 * step)])
 
 
+def _span(surface: GaussianSurface) -> tuple[float, float, float]:
+    """First node of a line, step and furthest node, in correlation lengths."""
+    pitch = np.broadcast_to(np.asarray(surface.spacing, dtype=float), 2)
+    length = np.broadcast_to(np.asarray(surface.corr_length, dtype=float), 2)
+    node = float((pitch / length).max())
+    # A line that goes round the period must not come back to its facet
+    most = min(float((np.asarray(surface.shape) * pitch / length).min()) - 1.0, FAR)
+    return max(STEP, FIRST_NODES * node), max(STEP, LEAST_NODES * node), most
+
+
 def profiles_of(
     surface: GaussianSurface,
     ensemble: Ensemble,
@@ -87,12 +97,8 @@ def _profiles(
     ensemble, along = known.held
     theta_i, phi_i = source
     of_cells, asked = np.frombuffer(cells).reshape(shape[0]), np.frombuffer(wanted, bool)
-    pitch = np.broadcast_to(np.asarray(surface.spacing, dtype=float), 2)
     length = np.broadcast_to(np.asarray(surface.corr_length, dtype=float), 2)
-    node = float((pitch / length).max())
-    # A line that goes round the period must not come back to its facet
-    most = min(float((np.asarray(surface.shape) * pitch / length).min()) - 1.0, FAR)
-    first, step = max(STEP, FIRST_NODES * node), max(STEP, LEAST_NODES * node)
+    first, step, most = _span(surface)
     rise = math.cos(theta_i) / max(math.sin(theta_i), 1e-12)
     high = CLEAR * surface.ensemble_height_rms / float(length.min())
     ways_i = _ways(first, step, min(high / rise, most))
@@ -121,9 +127,9 @@ def _room(sources: int, nodes: int, n_theta: int, columns: int) -> Profiles:
     )  # fmt: skip
 
 
-def most_bytes(columns: int) -> float:
+def most_bytes(surface: GaussianSurface, columns: int) -> float:
     """Memory of the lines of a direction at most, for so many columns of cells. [bytes]"""
-    nodes = 2 * _ways(STEP, STEP, FAR).size
+    nodes = 2 * _ways(*_span(surface)).size
     return 8.0 * nodes**2 * 2.0 * max(TURNS * MANY, columns)
 
 
