@@ -294,8 +294,8 @@ class StoredBRDF:
     def _angles(self, theta_i: Any, theta_s: Any, dphi: Any) -> list[np.ndarray]:
         low, high = self._theta_i[0], self._theta_i[-1]
         incidence = require(
-            "theta_i", theta_i, lambda v: (v >= low - 1e-9) & (v <= high + 1e-9),
-            f"lie in the store's [{low:.4g}, {high:.4g}] rad",
+            "theta_i", theta_i, lambda v: (v >= low - 1e-6) & (v <= high + 1e-6),
+            f"lie in the store's [{low:.7g}, {high:.7g}] rad",
             "Angles are radians; compute others by a sweep that goes so far.",
         )  # fmt: skip
         cure = "Angles are radians; use np.deg2rad."

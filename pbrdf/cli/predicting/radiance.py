@@ -154,7 +154,14 @@ def command(
             _read(source), views, phi_s=azimuths, wavelength=waves, sun=sun,
             sky=skies or None, temperature=temperature,
         )  # fmt: skip
-        seen = seen if response is None else in_band(seen, response)
+        if response is not None:
+            if seen.sizes.get("wavelength", 1) < 2:
+                msg = (
+                    "--wavelength-um must have two wavelengths or more with --band, which "
+                    "cover it."
+                )
+                raise ValueError(msg)
+            seen = in_band(seen, response)
         if target.suffix == ".nc":
             write_result(seen, stage)
         else:
