@@ -1,7 +1,7 @@
 """What the store of a sweep holds: its axes in the words of Python, and its points."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -163,6 +163,15 @@ class Contents:
                 about[one.dim] = one.around(values[name])
         lost = [self.dataset[name].isel(about).to_numpy() for name in held]
         return float(np.sum(lost, axis=0).max())
+
+    def finished(self, names: Iterable[str]) -> np.ndarray:
+        """Whether points are finished, along these parameters; of a list any of them."""
+        dims = [self.parameters[name].dim for name in names]
+        done = self.dataset.state.load() == _DONE
+        done = done.expand_dims([d for d in dims if d not in done.dims])
+        whole = done.any([d for d in done.dims if d not in dims])
+        sizes = tuple(self.dataset.sizes.get(d, 1) for d in dims)
+        return np.broadcast_to(whole.transpose(*dims).to_numpy(), sizes)
 
     def _check_done(self, here: xr.Dataset) -> None:
         state = here.state.load()

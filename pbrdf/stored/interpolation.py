@@ -97,8 +97,17 @@ class Interpolation:
         return self._contents.parameters
 
     def _middle(self) -> dict[str, np.ndarray]:
-        """Return the middle of all axes."""
-        return {n: np.array([(len(p.nodes) - 1) // 2]) for n, p in self._axes.items()}
+        """Return the middle of all axes, or the finished point that is nearest to it."""
+        middle = np.array([(len(p.nodes) - 1) // 2 for p in self._axes.values()], dtype=int)
+        done = np.argwhere(self._contents.finished(self._axes))
+        if len(done):
+            middle = done[np.argmin(np.abs(done - middle).sum(-1))]
+        return {n: np.array([at]) for n, at in zip(self._axes, middle, strict=True)}
+
+    def _finished_along(self, name: str, middle: dict[str, np.ndarray]) -> np.ndarray:
+        """Return the numbers of the finished nodes of one axis through a point."""
+        here = tuple(slice(None) if n == name else int(middle[n][0]) for n in self._axes)
+        return np.flatnonzero(self._contents.finished(self._axes)[here])
 
     def _stencil(
         self, place: dict[str, Any], keep: str | None
@@ -144,12 +153,14 @@ class Interpolation:
         found: dict[str, Measured] = {}
         for name, one in self._axes.items():
             if one.number and len(one.nodes) > 1:
-                line = middle | {name: np.arange(len(one.nodes))}
+                along = self._finished_along(name, middle)
+                if len(along) < 2:
+                    continue
                 value, stderr = (
-                    array.reshape(len(one.nodes), *array.shape[len(middle) :])
-                    for array in self._contents.read(line)
+                    array.reshape(len(along), *array.shape[len(middle) :])
+                    for array in self._contents.read(middle | {name: along})
                 )
-                found[name] = _measure(one.nodes, value, stderr)
+                found[name] = _measure(one.nodes[along], value, stderr)
         value, stderr = (
             array.reshape(array.shape[len(middle) :])
             for array in self._contents.read(middle)

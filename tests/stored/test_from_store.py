@@ -214,7 +214,7 @@ def test_outside_of_the_store_is_refused_by_name(
 
 def test_incidences_outside_are_refused(store: Path) -> None:
     with pytest.raises(
-        ValueError, match=r"theta_i must lie in the store's \[0.1745, 0.9599\]"
+        ValueError, match=r"theta_i must lie in the store's \[0.1745329, 0.9599311\]"
     ):
         pbrdf.from_store(store).brdf(1.2, 0.5, np.pi, slope_rms=0.2, n=1.5)
 
@@ -231,6 +231,18 @@ def test_what_is_not_computed_is_refused_by_name(store: Path, tmp_path: Path) ->
         ValueError, match=r"finished at slope_rms=0.3, n=1.7, which is failed"
     ):
         source.brdf(0.5, 0.5, np.pi, slope_rms=0.3, n=1.7)
+    # In the middle, where schemes are chosen: others still answer
+    state[1, 1], state[3, 1] = 0, 2
+    hurt = pbrdf.from_store(tmp_path / "s.zarr")
+    node = {"slope_rms": 0.12, "n": 1.4}
+    assert_allclose(
+        hurt.brdf(0.9599310885, 0.5, np.pi, **node),
+        pbrdf.from_store(store).brdf(np.deg2rad(55.0), 0.5, np.pi, **node),
+        rtol=1e-5, atol=1e-9,
+    )  # fmt: skip
+    assert np.isfinite(hurt.error(0.5, 0.5, np.pi, **node)).all()
+    with pytest.raises(ValueError, match=r"n=1.5, which is not computed yet"):
+        hurt.brdf(0.5, 0.5, np.pi, slope_rms=0.16, n=1.5)
 
 
 def test_other_folders_and_designs_are_refused(tmp_path: Path) -> None:
