@@ -52,6 +52,9 @@ def connected(address: str) -> Iterator[Any]:
         yield client
 
 
+GONE = "the scheduler is gone. What is finished is in the store; the same command goes on."
+
+
 def by_client(
     client: Any,
     sweep: Sweep,
@@ -88,14 +91,14 @@ def by_client(
     for future in flow:
         group = of.pop(future)
         if future.cancelled() or client.status != "running":
-            msg = (
-                "the scheduler is gone. What is finished is in the store; the same command "
-                "goes on."
-            )
-            raise ConnectionError(msg)
+            raise ConnectionError(GONE)
         error = future.exception() if future.status == "error" else None
         if future.status == "finished":
-            report.add(future.result())
+            try:
+                report.add(future.result())
+            except (OSError, distributed.CancelledError) as fault:
+                # The task ended well: its answer was lost on the way
+                raise ConnectionError(GONE) from fault
         elif isinstance(error, OSError) and error.errno in FULL:
             client.cancel(list(of))
             raise error

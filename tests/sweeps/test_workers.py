@@ -13,6 +13,7 @@ from pathlib import Path
 import distributed
 import pytest
 import xarray as xr
+from distributed import CancelledError
 
 from pbrdf.sweeps import load_sweep, run_sweep, tasks
 from tests.sweeps.scenes import SWEEP, opened, serial_run, written
@@ -157,6 +158,25 @@ def test_a_lost_scheduler_leaves_a_store_that_goes_on(serial: Path, tmp_path: Pa
     report = run_sweep(sweep, path, workers=1)
     assert report.kept >= 3
     xr.testing.assert_identical(opened(path), opened(serial))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", [ConnectionResetError(104, "reset"), CancelledError()])
+def test_an_answer_lost_on_the_way_is_a_lost_scheduler(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: Exception
+) -> None:
+    def lost(future: distributed.Future) -> None:
+        raise fault
+
+    monkeypatch.setattr(distributed.Future, "result", lost)
+    sweep = load_sweep(written(tmp_path, MANY))
+    with (
+        distributed.Client(
+            processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None
+        ) as client,
+        pytest.raises(OSError, match="scheduler is gone"),
+    ):
+        run_sweep(sweep, tmp_path / "s.zarr", client=client)
 
 
 @pytest.mark.slow
