@@ -147,12 +147,12 @@ def at_work(scene: Scene, size: Size, effort: Effort, *, among: int | None = Non
     # One after another: what was estimated, and strengths of single elements of it
     finished = size.result + 8 * size.unit / size.n_stokes**2
     surface = scene.surface
-    drawn_anew = isinstance(surface, GaussianSurface) and not batched
+    drawn_anew = surface if isinstance(surface, GaussianSurface) and not batched else None
     mapped = surface if clean and isinstance(surface, HeightMap) else None
-    if effort.looks and (drawn_anew or mapped is not None):
+    if effort.looks and (drawn_anew is not None or mapped is not None):
         sights = _sights(size)
-        if isinstance(surface, GaussianSurface) and not batched:
-            lines = most_bytes(surface, size.bins // LEAST_THETA)
+        if drawn_anew is not None:
+            lines = most_bytes(drawn_anew, size.bins // LEAST_THETA)
             sights += size.angles * size.azimuths * lines
         if mapped is not None:
             # What the points of each facet tell, and looks of each batch
