@@ -4,14 +4,15 @@ from pbrdf.signatures.bands import in_band, read_response
 from pbrdf.signatures.comparison import contrast
 from pbrdf.signatures.image import image_axes
 from pbrdf.signatures.planck import black_body
-from pbrdf.signatures.rayleigh import RayleighSky, rayleigh_optical_depth
+from pbrdf.signatures.rayleigh import ClearSky, RayleighSky, rayleigh_optical_depth
 from pbrdf.signatures.run import signature
 from pbrdf.signatures.skies import OvercastSky, SkyTable, ThermalSky, read_sky
 from pbrdf.signatures.smooth import SmoothSurface
 from pbrdf.signatures.sun import Sun
-from pbrdf.signatures.sun_place import sun_position
+from pbrdf.signatures.sun_place import sun_distance, sun_position
 
 __all__ = [
+    "ClearSky",
     "OvercastSky",
     "RayleighSky",
     "SkyTable",
@@ -26,5 +27,6 @@ __all__ = [
     "read_response",
     "read_sky",
     "signature",
+    "sun_distance",
     "sun_position",
 ]

@@ -161,9 +161,9 @@ def mirrored_sun(
     is the radiance of the disc, dimmed by the surface.
     """
     theta, phi = at
-    if _angle(theta, phi + pi, sun.theta, sun.phi) > sun.half_angle:
+    if _angle(theta, phi + pi, sun.theta, sun.phi) > sun.radius:
         return np.zeros(4)
-    return np.asarray(irradiance / (pi * np.sin(sun.half_angle) ** 2) * beam[:, 0])
+    return np.asarray(irradiance / (pi * np.sin(sun.radius) ** 2) * beam[:, 0])
 
 
 def _rough(integrand: Any, side: float, half: float) -> np.ndarray:

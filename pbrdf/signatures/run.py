@@ -59,8 +59,9 @@ def signature(  # noqa: PLR0913  (the public signature)
         Those of the dataset if not given. [um]
     sun : Sun, optional
         Direct sunlight.
-    sky : RayleighSky, OvercastSky, ThermalSky, SkyTable, other with stokes(...), or several
-        Light of the sky; that of several is added.
+    sky : ClearSky, RayleighSky, OvercastSky, ThermalSky, SkyTable, or several
+        Light of the sky, or another object with stokes(theta, phi, wavelength); that of
+        several is added.
     temperature : float, optional
         Of the surface, which then emits by Kirchhoff's law; what is transmitted into the
         substrate counts as absorbed there, at this temperature. [K]

@@ -2,12 +2,13 @@
 
 from datetime import datetime
 from math import pi
+from typing import Any
 
 import numpy as np
 
 from pbrdf.errors import one_number
 
-__all__ = ["sun_position"]
+__all__ = ["sun_distance", "sun_position"]
 
 
 def sun_position(
@@ -19,6 +20,8 @@ def sun_position(
     x_azimuth: float = pi / 2,
 ) -> tuple[float, float]:
     """Zenith and azimuth of the sun, as `Sun(theta=, phi=)` takes them. [rad]
+
+    How far it is then, and so how bright, is `Sun(distance=sun_distance(time))`.
 
     By the NREL algorithm of pvlib [1]_, to some 1e-5 rad, with refraction in mean air.
 
@@ -59,16 +62,11 @@ def sun_position(
         ),
     ]  # fmt: skip
     moment = _moment(time)
-    try:
-        from pvlib.solarposition import get_solarposition
-    except ImportError as error:
-        msg = "sun_position must have the package pvlib, which is not here. Install it: "
-        raise ValueError(msg + 'pip install "pbrdf[sun]".') from error
-    import pandas as pd
-
-    found = get_solarposition(
-        pd.DatetimeIndex([moment]), *np.rad2deg(place), altitude=altitude
-    ).iloc[0]
+    found = (
+        _pvlib("sun_position")
+        .get_solarposition(_index(moment), *np.rad2deg(place), altitude=altitude)
+        .iloc[0]
+    )
     theta, compass = np.deg2rad([found["apparent_zenith"], found["azimuth"]])
     if theta >= pi / 2:
         msg = (
@@ -78,6 +76,40 @@ def sun_position(
         raise ValueError(msg)
     # Azimuths of surfaces run counter-clockwise, those of the compass clockwise
     return float(theta), float(np.mod(x_azimuth - compass, 2 * pi))
+
+
+def sun_distance(time: datetime | str) -> float:
+    """Distance of the sun at a time, as `Sun(distance=)` takes it. [au]
+
+    Raises
+    ------
+    ValueError
+        If pvlib is not installed or the time has no zone.
+
+    Examples
+    --------
+    >>> round(sun_distance("2026-07-06T18:00Z"), 4)  # doctest: +SKIP
+    1.0166
+    """
+    moment = _moment(time)
+    found = _pvlib("sun_distance").nrel_earthsun_distance(_index(moment))
+    return float(found.iloc[0])
+
+
+def _pvlib(asked: str) -> Any:
+    """Return the module of pvlib on the sun's place."""
+    try:
+        from pvlib import solarposition
+    except ImportError as error:
+        msg = f"{asked} must have the package pvlib, which is not here. Install it: "
+        raise ValueError(msg + 'pip install "pbrdf[sun]".') from error
+    return solarposition
+
+
+def _index(moment: datetime) -> Any:
+    import pandas as pd
+
+    return pd.DatetimeIndex([moment])
 
 
 def _moment(time: datetime | str) -> datetime:

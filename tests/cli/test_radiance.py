@@ -11,7 +11,7 @@ import pbrdf
 from data_io import read_result, write_model
 from pbrdf import Material, MicrofacetModel
 from pbrdf.cli import main
-from pbrdf.signatures import RayleighSky, Sun, rayleigh_optical_depth
+from pbrdf.signatures import ClearSky, RayleighSky, Sun, rayleigh_optical_depth
 
 SCENE = """
 [surface]
@@ -63,6 +63,19 @@ def test_a_model_under_sun_and_sky(folder: Path) -> None:
     assert main(["radiance", "model.toml", *place]) == 2
 
 
+def test_a_clear_sky_over_bright_ground_in_the_mountains(folder: Path) -> None:
+    place = ["--sun-zenith-deg", "50", "--sun-azimuth-deg", "20"]
+    light = ["--sky", "clear", "--ground-albedo", "0.3", "--pressure-hpa", "700"]
+    view = ["--view-zenith-deg", "40", "--wavelength-um", "0.45"]
+    assert main(["radiance", "model.toml", *place, *light, *view]) == 0
+    row = pd.read_csv("model-radiance.csv", comment="#").iloc[0]
+    depth = float(rayleigh_optical_depth(0.45, 700.0))
+    sun = Sun(theta=np.deg2rad(50), phi=np.deg2rad(20), optical_depth=depth)
+    sky = ClearSky(sun=sun, pressure=700.0, ground_albedo=0.3)
+    seen = pbrdf.signature(MODEL, np.deg2rad(40), wavelength=0.45, sun=sun, sky=sky)
+    assert_allclose(row[list("IQUV")].to_numpy(float), seen.radiance, rtol=1e-6, atol=1e-9)
+
+
 def test_a_result_that_is_warm(folder: Path, capsys: pytest.CaptureFixture) -> None:
     quick = ["--n-rays", "1000", "--realizations", "8", "--phi-i-deg", "uniform"]
     assert (
@@ -84,7 +97,34 @@ def test_a_result_that_is_warm(folder: Path, capsys: pytest.CaptureFixture) -> N
         (["model.toml"], "give --sun-zenith-deg"),
         (["scene.toml", "--sun-zenith-deg", "30"], "is a scene"),
         (["model.toml", "--sky", "rayleigh"], "--sky rayleigh needs --sun-zenith-deg"),
+        (["model.toml", "--sky", "clear"], "--sky clear needs --sun-zenith-deg"),
         (["model.toml", "--sky", "overcast"], "needs --sky-radiance"),
+        (
+            [
+                "model.toml",
+                "--ground-albedo",
+                "0.2",
+                "--sun-zenith-deg",
+                "3",
+                "--sky",
+                "rayleigh",
+            ],
+            "--ground-albedo needs --sky clear",
+        ),
+        (
+            [
+                "model.toml",
+                "--pressure-hpa",
+                "700",
+                "--sun-zenith-deg",
+                "3",
+                "--sky",
+                "clear",
+                "--optical-depth",
+                "0.2",
+            ],
+            "two atmospheres",
+        ),
         (["model.toml", "--sun-zenith-deg", "30", "--sky", "rayleigh"], "--wavelength-um"),
         (["model.toml", "--sun-zenith-deg", "30", "-o", "a.txt"], ".csv or .nc"),
         (["model.toml", "--sun-azimuth-deg", "30"], "needs --sun-zenith-deg"),

@@ -12,7 +12,14 @@ from scipy.integrate import quad
 import pbrdf
 from data_io import write_model
 from pbrdf.cli import main
-from pbrdf.signatures import Sun, in_band, read_response, sun_position
+from pbrdf.signatures import (
+    SmoothSurface,
+    Sun,
+    in_band,
+    read_response,
+    sun_distance,
+    sun_position,
+)
 
 PLATE = pbrdf.MicrofacetModel(
     pbrdf.Material(1.5), 0.2, specular_gain=0.0, diffuse_albedo=0.6
@@ -149,3 +156,54 @@ def test_a_sun_below_the_horizon_is_refused() -> None:
     pytest.importorskip("pvlib")
     with pytest.raises(ValueError, match="above the horizon"):
         sun_position("2026-06-21T00:00Z", 0.5, 0.0)
+
+
+def test_the_sun_is_nearest_in_january() -> None:
+    """Perihelion 0.98330 au on 3 January 2026, aphelion 1.01664 au on 6 July (USNO)."""
+    pytest.importorskip("pvlib")
+    near, far = sun_distance("2026-01-03T17:00Z"), sun_distance("2026-07-06T17:30Z")
+    assert_allclose([near, far], [0.98330, 1.01664], atol=1e-5)
+    with pytest.raises(ValueError, match="time must have a time zone"):
+        sun_distance("2026-07-06T17:30")
+
+
+def test_light_falls_with_the_square_of_the_distance() -> None:
+    far = Sun.planck(theta=0.6, phi=0.3, distance=1.2)
+    one = Sun.planck(theta=0.6, phi=0.3)
+    dim, bright = (
+        pbrdf.signature(PLATE, 0.4, wavelength=0.55, sun=sun).radiance[0]
+        for sun in (far, one)
+    )
+    # Beside the mean cosine over the disc, 1 - radius^2/4
+    assert_allclose(float(dim), float(bright) / 1.44, rtol=3e-6)
+    # The disc is as bright as before, and smaller
+    mirror, at = SmoothSurface(pbrdf.Material(1.5)), {"phi_s": 0.3 + np.pi}
+    inside, outside = 0.6 + 0.9 * one.half_angle / 1.2, 0.6 + 1.1 * one.half_angle / 1.2
+    kept, same, edge, dark = (
+        pbrdf.signature(mirror, view, wavelength=0.55, sun=sun, **at).radiance
+        for view, sun in ((inside, one), (inside, far), (outside, one), (outside, far))
+    )
+    assert_allclose(same, kept, rtol=1e-9, atol=1e-9)
+    assert float(edge[0]) > 0
+    assert not dark.any()
+    assert Sun(theta=0.1, distance=1.2).above(0.5) == 1.0
+    with pytest.raises(ValueError, match=r"distance must lie in .* au, got 149600000"):
+        Sun(theta=0.1, distance=149.6e6)
+
+
+def test_a_time_on_the_command_line_brings_the_distance(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("pvlib")
+    monkeypatch.chdir(tmp_path)
+    write_model(PLATE, "plate.toml")
+    noon = ["--latitude-deg", "1", "--longitude-deg", "2", "--planck-sun"]
+    moment = "2026-07-06T12:00Z"
+    more = ["--wavelength-um", "0.5", "--time", moment, "-o", "seen.csv"]
+    assert main(["radiance", "plate.toml", *noon, *more]) == 0
+    theta, phi = sun_position(moment, np.deg2rad(1), np.deg2rad(2))
+    sun = Sun.planck(theta=theta, phi=phi)
+    expected = 0.6 / np.pi * sun.at_ground(0.5) * np.cos(theta) / sun_distance(moment) ** 2
+    found = pd.read_csv("seen.csv", comment="#").I[0]
+    assert_allclose(found, expected, rtol=1e-4)
+    assert abs(found / expected * 1.0166**-2 - 1) > 0.03

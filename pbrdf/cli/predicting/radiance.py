@@ -1,25 +1,17 @@
 """`pbrdf radiance`: what a sensor sees of a surface under sun and sky, or warm."""
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pbrdf.cli import option_text, options
+from pbrdf.cli.lighting import Clear, Place, lights, place_at
 
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
     import xarray as xr
-
-
-class Clear(StrEnum):
-    """Skies without numbers of their own."""
-
-    none = "none"
-    rayleigh = "rayleigh"
-    overcast = "overcast"
 
 
 def command(
@@ -77,10 +69,34 @@ def command(
             min=0.0,
             max=50.0,
             help="Vertical, of the air between sun and ground; that of clean air for a "
-            "rayleigh sky, none otherwise.",
+            "rayleigh or clear sky, none otherwise.",
         ),
     ] = None,
-    sky: Annotated[Clear, typer.Option(help="Kind of sky.")] = Clear.none,
+    sky: Annotated[
+        Clear,
+        typer.Option(
+            help="Kind of sky. rayleigh: light scattered once; clear: any number of times, "
+            "over ground of --ground-albedo."
+        ),
+    ] = Clear.none,
+    ground_albedo: Annotated[
+        float | None,
+        typer.Option(
+            "--ground-albedo",
+            min=0.0,
+            max=1.0,
+            help="Of the ground around, which lights a clear sky from below; 0 without it.",
+        ),
+    ] = None,
+    pressure: Annotated[
+        float | None,
+        typer.Option(
+            "--pressure-hpa",
+            min=1.0,
+            max=1200.0,
+            help="Of the air of a rayleigh or clear sky; 1013.25 without it.",
+        ),
+    ] = None,
     sky_radiance: Annotated[
         float | None,
         typer.Option("--sky-radiance", min=0.0, help="Of clouds [W/(m2 sr um)]."),
@@ -126,14 +142,15 @@ def command(
     waves = option_text.wavelengths(wavelength)
     views = option_text.angles(view_zenith, "--view-zenith-deg", below=90.0)
     azimuths = _azimuths(view_azimuth)
+    place = Place(sun_zenith, sun_azimuth)
     if time is not None or latitude is not None or longitude is not None:
-        angles = sun_zenith, sun_azimuth
-        sun_zenith, sun_azimuth = _sun_at(time, latitude, longitude, angles)
+        place = place_at(time, latitude, longitude, place)
     response = None if band is None else read_response(band)
-    sun, skies = _lights(
-        sun_zenith=sun_zenith, sun_azimuth=sun_azimuth, sun_irradiance=sun_irradiance,
+    sun, skies = lights(
+        place=place, sun_irradiance=sun_irradiance,
         planck_sun=planck_sun, optical_depth=optical_depth, sky=sky,
         sky_radiance=sky_radiance, sky_table=sky_table, sky_temperature=sky_temperature,
+        ground_albedo=ground_albedo, pressure=pressure,
     )  # fmt: skip
     if sun is None and not skies and temperature is None:
         msg = "radiance needs light: give --sun-zenith-deg, --sky, --temperature-k or more."
@@ -173,27 +190,6 @@ def command(
     typer.echo(f"Result: {target}")
 
 
-def _sun_at(
-    time: str | None,
-    latitude: float | None,
-    longitude: float | None,
-    angles: tuple[float | None, float | None],
-) -> tuple[float, float]:
-    """Return zenith and azimuth of the sun at a place and time. [deg]"""
-    from math import degrees, radians
-
-    from pbrdf.signatures import sun_position
-
-    if time is None or latitude is None or longitude is None or angles != (None, None):
-        msg = (
-            "--time, --latitude-deg and --longitude-deg must be given together, and "
-            "without --sun-zenith-deg and --sun-azimuth-deg."
-        )
-        raise ValueError(msg)
-    theta, phi = sun_position(time, radians(latitude), radians(longitude))
-    return degrees(theta), degrees(phi)
-
-
 def _azimuths(text: str) -> "np.ndarray":
     """Return azimuths of the sensor. [rad]"""
     import numpy as np
@@ -213,85 +209,6 @@ def _check_relative(absolute: dict[str, Any]) -> None:
                 "--sun-irradiance or --planck-sun must be given where other light is in "
                 f"W/(m2 sr um), as by {option}."
             )
-            raise ValueError(msg)
-
-
-def _lights(
-    *,
-    sun_zenith: float | None,
-    sun_azimuth: float | None,
-    sun_irradiance: float | None,
-    planck_sun: bool,
-    optical_depth: float | None,
-    sky: Clear,
-    sky_radiance: float | None,
-    sky_table: Path | None,
-    sky_temperature: float | None,
-) -> tuple[Any, list[Any]]:
-    """Return the sun and the skies that the options describe."""
-    from math import radians
-
-    from pbrdf.signatures import (
-        OvercastSky,
-        RayleighSky,
-        Sun,
-        ThermalSky,
-        rayleigh_optical_depth,
-        read_sky,
-    )
-
-    _check_pairs(
-        {
-            "--sun-irradiance": (sun_irradiance, "--sun-zenith-deg", sun_zenith),
-            "--sun-azimuth-deg": (sun_azimuth, "--sun-zenith-deg", sun_zenith),
-            "--planck-sun": (planck_sun or None, "--sun-zenith-deg", sun_zenith),
-            "--sky rayleigh": (
-                sky if sky is Clear.rayleigh else None, "--sun-zenith-deg", sun_zenith
-            ),
-            "--sky overcast": (
-                sky if sky is Clear.overcast else None, "--sky-radiance", sky_radiance
-            ),
-            "--sky-radiance": (
-                sky_radiance, "--sky overcast", sky if sky is Clear.overcast else None
-            ),
-            "--optical-depth": (optical_depth, "--sun-zenith-deg", sun_zenith),
-        }
-    )  # fmt: skip
-    if planck_sun and sun_irradiance is not None:
-        msg = "--planck-sun and --sun-irradiance are two suns. Give one of them."
-        raise ValueError(msg)
-
-    def clean_air(wavelength: float) -> float:
-        return float(rayleigh_optical_depth(wavelength))
-
-    depth: Any = 0.0 if optical_depth is None else optical_depth
-    if optical_depth is None and sky is Clear.rayleigh:
-        depth = clean_air
-    sun: Sun | None = None
-    skies: list[Any] = []
-    if sun_zenith is not None:
-        azimuth = 180.0 if sun_azimuth is None else sun_azimuth
-        place = {"theta": radians(sun_zenith), "phi": radians(azimuth)}
-        if planck_sun:
-            sun = Sun.planck(**place, optical_depth=depth)
-        else:
-            sun = Sun(**place, irradiance=sun_irradiance, optical_depth=depth)
-    if sky is Clear.rayleigh and sun is not None:
-        skies.append(RayleighSky(sun=sun, optical_depth=depth))
-    if sky is Clear.overcast and sky_radiance is not None:
-        skies.append(OvercastSky(radiance=sky_radiance))
-    if sky_table is not None:
-        skies.append(read_sky(sky_table))
-    if sky_temperature is not None:
-        skies.append(ThermalSky(temperature=sky_temperature))
-    return sun, skies
-
-
-def _check_pairs(pairs: dict[str, tuple[Any, str, Any]]) -> None:
-    """Refuse an option that lacks the other it needs."""
-    for option, (given, needed, there) in pairs.items():
-        if given is not None and there is None:
-            msg = f"{option} needs {needed}. Give both or neither."
             raise ValueError(msg)
 
 
