@@ -19,12 +19,13 @@ __all__ = [
     "LEAST_COSINE",
     "Medium",
     "Ray",
-    "curvature_changes",
+    "difference",
     "first_order",
     "lateral_ray",
     "medium_of",
     "tangent_plane",
     "turn_between",
+    "turned",
 ]
 
 # Lateral wave vector as its length and azimuth, and the normal component: sin, cos of the
@@ -204,22 +205,3 @@ def turned(jones, ray_in, ray_out, come, to):
     ss, sp = blend(cos_n, ss, sin_n, sp), blend(cos_n, sp, -sin_n, ss)
     ps, pp = blend(cos_n, ps, sin_n, pp), blend(cos_n, pp, -sin_n, ps)
     return ss, sp, ps, pp
-
-
-@jit(part=True)
-def curvature_changes(ray_in, ray_out, shift_x, shift_y, medium):
-    """First-order less tangent-plane kernel where the surface adds a wave vector +-shift.
-
-    Taken at the mean of the two lateral vectors, plus and minus half the shift, and turned
-    into the frames of the rays given. The second has the rays exchanged: by reciprocity
-    ss and pp are the same, sp and ps change places and sign.
-    """
-    middle_x = 0.5 * (ray_out.sin * ray_out.along + ray_in.sin * ray_in.along)
-    middle_y = 0.5 * (ray_out.sin * ray_out.across + ray_in.sin * ray_in.across)
-    to = lateral_ray(middle_x + 0.5 * shift_x, middle_y + 0.5 * shift_y)
-    come = lateral_ray(middle_x - 0.5 * shift_x, middle_y - 0.5 * shift_y)
-    ss, sp, ps, pp = difference(come, to, medium)
-    return (
-        turned((ss, sp, ps, pp), ray_in, ray_out, come, to),
-        turned((ss, -ps, -sp, pp), ray_in, ray_out, to, come),
-    )

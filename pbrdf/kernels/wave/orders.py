@@ -21,18 +21,28 @@ GAUSSIAN, EXPONENTIAL = range(2)
 # Half-width of a window in standard deviations, and terms in one: both leave 1e-15
 REACH, TERMS_IN_WIDTH = 8.5, 1.3
 LEAST_EXPONENT = -745.0
+# Heaviest order below which sums begin at the first
+COARSE = 12.0
+# Orders whose spectra are found together
+TOGETHER = 64
 
 
 @jit(part=True)
 def heaviest_order(g, kappa):
-    """Order where g^n/n! exp(-kappa/n) is largest, from n^2 ln(n/g) = kappa."""
+    """Order where g^n/n! exp(-kappa/n) is largest, from n^2 ln(n/g) = kappa.
+
+    To 2 % where it is small, as the end of a sum term by term needs no more; else to far
+    less than the width of the bell.
+    """
     target = 2.0 * kappa / (g * g)
     if target < 0.1:
         return g * (1.0 + 0.5 * target)
-    # Newton's steps for y ln y = target, y = (n/g)^2
+    # Newton's steps for y ln y = target, y = (n/g)^2; they come from above
     y = 1.0 + target / (1.0 + log1p(target))
-    for _ in range(5):
-        y = (y + target) / (1.0 + log(y))
+    y = (y + target) / (1.0 + log(y))
+    if g * sqrt(y) > COARSE:
+        for _ in range(2):
+            y = (y + target) / (1.0 + log(y))
     return g * sqrt(y)
 
 
@@ -84,26 +94,65 @@ def window(law, g, kappa):
     return first, last, max(np.floor(width / TERMS_IN_WIDTH), 1.0)
 
 
+@jit(forceinline=True)
+def summed(moments, n, inverse, term):
+    """Moments of n^2, n, 1, 1/n, 1/n^2 with those of one more term."""
+    rising, mean, total, falling, steep = moments
+    less, more = term * inverse, term * n
+    return (
+        rising + n * more,
+        mean + more,
+        total + term,
+        falling + less,
+        steep + less * inverse,
+    )
+
+
 @jit(part=True)
-def order_moments(law, dimensions, g, kappa):
+def next_spectra(law, dimensions, start, count, kappa, inverses, spectra):
+    """Fill 1/n and the spectra of some orders from `start` on.
+
+    Each loop knows its law but not its length, so that it becomes vector instructions.
+    """
+    for k in range(count):
+        inverses[k] = 1.0 / (start + k)
+    if law == GAUSSIAN:
+        for k in range(count):
+            spectra[k] = spectrum_of_order(GAUSSIAN, 2, inverses[k], kappa)
+        if dimensions == 1:
+            for k in range(count):
+                spectra[k] /= sqrt(np.pi * inverses[k])
+    elif dimensions == 1:
+        for k in range(count):
+            spectra[k] = spectrum_of_order(EXPONENTIAL, 1, inverses[k], kappa)
+    else:
+        for k in range(count):
+            spectra[k] = spectrum_of_order(EXPONENTIAL, 2, inverses[k], kappa)
+
+
+@jit(part=True)
+def order_moments(law, dimensions, g, kappa, inverses, spectra):
     """Sum weight, spectrum and n^2, n, 1, 1/n or 1/n^2 over n, the length being 1."""
     first, last, step = window(law, g, kappa)
-    term_by_term = first == 1.0
-    weight = exp(-g) if g < 700.0 else 0.0
-    rising, mean, total, falling, steep = 0.0, 0.0, 0.0, 0.0, 0.0
-    n = first
-    while n <= last:
-        inverse = 1.0 / n
-        weight = weight * g * inverse if term_by_term else step * poisson_weight(n, g)
-        term = weight * spectrum_of_order(law, dimensions, inverse, kappa)
-        less, more = term * inverse, term * n
-        total += term
-        mean += more
-        rising += n * more
-        falling += less
-        steep += less * inverse
-        n += step
-    return rising, mean, total, falling, steep
+    moments = 0.0, 0.0, 0.0, 0.0, 0.0
+    if first > 1.0:
+        n = first
+        while n <= last:
+            inverse = 1.0 / n
+            spectrum = spectrum_of_order(law, dimensions, inverse, kappa)
+            term = step * poisson_weight(n, g) * spectrum
+            moments = summed(moments, n, inverse, term)
+            n += step
+        return moments
+    weight, end = exp(-g), np.int64(last) + 1
+    for start in range(1, end, TOGETHER):
+        count = min(TOGETHER, end - start)
+        next_spectra(law, dimensions, start, count, kappa, inverses, spectra)
+        for k in range(count):
+            weight *= g * inverses[k]
+            term = weight * spectra[k]
+            moments = summed(moments, float(start + k), inverses[k], term)
+    return moments
 
 
 @jit
@@ -113,10 +162,11 @@ def fill_moments(law, dimensions, height, length, spacing, rise, out):
     height and length are k h and k l; `spacing` is the lateral wave vector K/k, `rise` the
     normal one q/k.
     """
+    inverses, spectra = np.empty(TOGETHER), np.empty(TOGETHER)
     for k in range(spacing.size):
         g = (rise[k] * height[k]) ** 2
         kappa = 0.25 * (spacing[k] * length[k]) ** 2
         unit = length[k] if dimensions == 1 else length[k] * length[k]
-        moments = order_moments(law, dimensions, g, kappa)
+        moments = order_moments(law, dimensions, g, kappa, inverses, spectra)
         for j in range(5):
             out[j, k] = unit * moments[j]

@@ -16,16 +16,30 @@ from pbrdf.kernels.wave.amplitudes import (
     LEAST_COSINE,
     Ray,
     blend,
-    curvature_changes,
     first_order,
     medium_of,
     tangent_plane,
     turn_between,
 )
+from pbrdf.kernels.wave.curvature import (
+    ABSORPTION,
+    ACROSS,
+    ALONG,
+    CHANGES,
+    COS_IN,
+    COS_OUT,
+    INDEX,
+    LANES,
+    ROWS,
+    SIN_IN,
+    SIN_OUT,
+    SPREAD,
+    change,
+    fill_node_changes,
+)
 
 __all__ = [
     "CURVATURE",
-    "HORIZON",
     "ORDER_WEIGHTED",
     "RICE",
     "TANGENT",
@@ -43,9 +57,6 @@ Plan = namedtuple("Plan", "kernel dimensions shadowed")
 
 # g = q^2 h^2, rms wave vector of the heights per axis over k, rms slope
 Surface = namedtuple("Surface", "g spread slope")
-
-# Local wave vectors reach this share of the horizon, unless a ray given lies beyond
-HORIZON = 0.97
 
 SQRT_2, SQRT_PI = sqrt(2.0), sqrt(np.pi)
 SQRT_3 = sqrt(3.0)
@@ -134,44 +145,8 @@ def over_orders(sums, plain, per_order, mean, moments):
     return added(sums, spread_c * spread_c, per_order)
 
 
-@jit(forceinline=True)
-def reach_of_shift(ray_in, ray_out, x, y):
-    """Share of a shift that keeps both waves from the horizon; 1 of one that is small.
-
-    Of the share t where one of them would reach it, (1 + t^-8)^(-1/8): a step would show as
-    a kink wherever a surface or wavelength brings waves there.
-    """
-    middle_x = 0.5 * (ray_out.sin * ray_out.along + ray_in.sin * ray_in.along)
-    middle_y = 0.5 * (ray_out.sin * ray_out.across + ray_in.sin * ray_in.across)
-    rim = max(HORIZON, max(ray_in.sin, ray_out.sin))
-    square = 0.25 * (x * x + y * y)
-    along = 0.5 * abs(middle_x * x + middle_y * y)
-    room = rim * rim - middle_x * middle_x - middle_y * middle_y
-    # square t^2 + 2 along t = room, the worse sign of the two
-    inverse = (along + sqrt(along * along + square * room)) / (room + 1e-300)
-    fourth = inverse * inverse * inverse * inverse
-    return 1.0 / sqrt(sqrt(sqrt(1.0 + fourth * fourth)))
-
-
-@jit
-def node(plan, k, spread, ray_in, ray_out):
-    """Wave vector of node k of the spectrum, bounded by the horizon."""
-    if plan.dimensions == 1:
-        x, y = SQRT_3 * spread, 0.0
-    else:
-        # Along the mean of the two rays: exchanging them leaves the hexagon as it is
-        mx = ray_out.sin * ray_out.along + ray_in.sin * ray_in.along
-        my = ray_out.sin * ray_out.across + ray_in.sin * ray_in.across
-        length = sqrt(mx * mx + my * my)
-        cos_m, sin_m = (mx / length, my / length) if length > 1e-9 else (1.0, 0.0)
-        u, v = HEXAGON[k]
-        x, y = spread * (cos_m * u - sin_m * v), spread * (sin_m * u + cos_m * v)
-    share = reach_of_shift(ray_in, ray_out, x, y)
-    return share * x, share * y
-
-
 @jit(part=True)
-def with_curvature(ray_in, ray_out, medium, plan, surface, moments, changes):
+def with_curvature(plane, rice, plan, surface, moments, changes, lane):
     """Sum the order-weighted amplitude with the mean and scatter of the curvature.
 
     Order n is diffracted n times, by wave vectors xi_i that add up to K. With the change
@@ -179,42 +154,35 @@ def with_curvature(ray_in, ray_out, medium, plan, surface, moments, changes):
     with themselves. For a Gaussian spectrum and quadratic d its mean is
     b_KA + d(K)/n + (n - 1 - g) <d> and its variance (n - 1) var d.
     """
-    plane = tangent_plane(ray_in, ray_out, medium)
-    rice = first_order(ray_in, ray_out, medium)
     line = plan.dimensions == 1
     pairs, weight = (1, LINE_WEIGHT) if line else (3, HEXAGON_WEIGHT)
     mean = no_jones()
-    for k in range(pairs):
-        x, y = node(plan, k, surface.spread, ray_in, ray_out)
-        there, back = curvature_changes(ray_in, ray_out, x, y, medium)
-        for element in range(4):
-            changes[2 * k, element] = there[element]
-            changes[2 * k + 1, element] = back[element]
-        mean = combined(1.0, mean, weight, combined(1.0, there, 1.0, back))
+    for k in range(2 * pairs):
+        mean = combined(1.0, mean, weight, change(changes, 8 * k, lane))
     # Scatter about the mean; the node at zero has d = 0
     scatter = max(moments[1] - moments[2], 0.0)
     sums = added(nothing(), scatter * (1.0 - 2 * pairs * weight), mean)
     for k in range(2 * pairs):
-        there = (changes[k, 0], changes[k, 1], changes[k, 2], changes[k, 3])
+        there = change(changes, 8 * k, lane)
         sums = added(sums, scatter * weight, combined(1.0, there, -1.0, mean))
-    change = combined(1.0, rice, -1.0, plane)
+    way = combined(1.0, rice, -1.0, plane)
     plain = combined(1.0, plane, -(1.0 + surface.g), mean)
-    return over_orders(sums, plain, change, mean, moments)
+    return over_orders(sums, plain, way, mean, moments)
 
 
 @jit(part=True)
-def scattered_sums(ray_in, ray_out, medium, plan, surface, moments, changes):
+def scattered_sums(ray_in, ray_out, medium, plan, surface, moments, changes, lane):
     """Products of Jones elements of the scattered light, by the plan's amplitude."""
-    if plan.kernel == CURVATURE:
-        return with_curvature(ray_in, ray_out, medium, plan, surface, moments, changes)
     if plan.kernel == RICE:
         return added(nothing(), moments[2], first_order(ray_in, ray_out, medium))
     plane = tangent_plane(ray_in, ray_out, medium)
     if plan.kernel == TANGENT:
         return added(nothing(), moments[2], plane)
     rice = first_order(ray_in, ray_out, medium)
-    change = combined(1.0, rice, -1.0, plane)
-    return over_orders(nothing(), plane, change, no_jones(), moments)
+    if plan.kernel == CURVATURE:
+        return with_curvature(plane, rice, plan, surface, moments, changes, lane)
+    way = combined(1.0, rice, -1.0, plane)
+    return over_orders(nothing(), plane, way, no_jones(), moments)
 
 
 @jit(forceinline=True)
@@ -276,6 +244,44 @@ def write_matrix(sums, factor, into, away, out):
     out[15] = factor * (ss_pp - sp_ps).real
 
 
+@jit(forceinline=True)
+def set_lane(lanes, lane, angles, indices, spreads, k):
+    """Write geometry k into a lane."""
+    lanes[SIN_IN + lane] = np.sin(angles[0, k])
+    lanes[COS_IN + lane] = max(np.cos(angles[0, k]), LEAST_COSINE)
+    lanes[SIN_OUT + lane] = np.sin(angles[1, k])
+    lanes[COS_OUT + lane] = max(np.cos(angles[1, k]), LEAST_COSINE)
+    # Propagation turns by dphi - pi
+    lanes[ALONG + lane] = -np.cos(angles[2, k])
+    lanes[ACROSS + lane] = -np.sin(angles[2, k])
+    lanes[SPREAD + lane] = spreads[k]
+    lanes[INDEX + lane], lanes[ABSORPTION + lane] = indices[0, k], indices[1, k]
+
+
+@jit(part=True)
+def fill_matrix(lanes, lane, statistics, moments, dressing, plan, changes, out):
+    """Fill 16 elements from one lane."""
+    ray_in = Ray(lanes[SIN_IN + lane], lanes[COS_IN + lane], 1.0, 0.0)
+    ray_out = Ray(
+        lanes[SIN_OUT + lane], lanes[COS_OUT + lane],
+        lanes[ALONG + lane], lanes[ACROSS + lane],
+    )  # fmt: skip
+    medium = medium_of(lanes[INDEX + lane], lanes[ABSORPTION + lane])
+    rise = ray_in.cos + ray_out.cos
+    height = statistics[0] * rise
+    surface = Surface(height * height, statistics[1], statistics[2])
+    sums = scattered_sums(ray_in, ray_out, medium, plan, surface, moments, changes, lane)
+    factor = 1.0 / (np.pi * np.pi * ray_in.cos * ray_out.cos * rise * rise)
+    if plan.dimensions == 1:
+        factor = 2.0 / (np.pi * ray_in.cos * rise * rise)
+    if plan.shadowed:
+        factor *= shadowing(ray_in, ray_out, surface.slope)
+    # Of an order n of scattering one step in n is the mean field's; as an amplitude
+    share = sqrt(moments[3] / moments[2]) if moments[2] > 0.0 else 0.0
+    into, away = coherence(share, dressing[0]), coherence(share, dressing[1])
+    write_matrix(sums, factor, into, away, out)
+
+
 @jit
 def fill_scattering(angles, indices, statistics, moments, dressing, plan, out):
     """Fill the rows of `out` with Mueller matrices, 16 elements each.
@@ -295,26 +301,23 @@ def fill_scattering(angles, indices, statistics, moments, dressing, plan, out):
     out : (N, 16)
         1/sr; of a profile, power per radian over incident power.
     """
-    changes = np.empty((6, 4), dtype=np.complex128)
-    for k in range(out.shape[0]):
-        cos_i = max(np.cos(angles[0, k]), LEAST_COSINE)
-        cos_s = max(np.cos(angles[1, k]), LEAST_COSINE)
-        # Propagation turns by dphi - pi
-        ray_in = Ray(np.sin(angles[0, k]), cos_i, 1.0, 0.0)
-        turn, side = -np.cos(angles[2, k]), -np.sin(angles[2, k])
-        ray_out = Ray(np.sin(angles[1, k]), cos_s, turn, side)
-        medium = medium_of(indices[0, k], indices[1, k])
-        rise = cos_i + cos_s
-        height = statistics[0, k] * rise
-        surface = Surface(height * height, statistics[1, k], statistics[2, k])
-        five = (moments[0, k], moments[1, k], moments[2, k], moments[3, k], moments[4, k])
-        sums = scattered_sums(ray_in, ray_out, medium, plan, surface, five, changes)
-        factor = 1.0 / (np.pi * np.pi * cos_i * cos_s * rise * rise)
-        if plan.dimensions == 1:
-            factor = 2.0 / (np.pi * cos_i * rise * rise)
-        if plan.shadowed:
-            factor *= shadowing(ray_in, ray_out, surface.slope)
-        # Of an order n of scattering one step in n is the mean field's; as an amplitude
-        share = sqrt(five[3] / five[2]) if five[2] > 0.0 else 0.0
-        into, away = coherence(share, dressing[0, k]), coherence(share, dressing[1, k])
-        write_matrix(sums, factor, into, away, out[k])
+    lanes = np.zeros(ROWS * LANES)
+    nodes = 1 if plan.dimensions == 1 else 3
+    changes = np.zeros(nodes * CHANGES * LANES)
+    for start in range(0, out.shape[0], LANES):
+        count = min(LANES, out.shape[0] - start)
+        for lane in range(count):
+            set_lane(lanes, lane, angles, indices, statistics[1], start + lane)
+        if plan.kernel == CURVATURE:
+            for k in range(nodes):
+                u, v = HEXAGON[k] if nodes == 3 else (SQRT_3, 0.0)
+                rows = changes[k * CHANGES * LANES : (k + 1) * CHANGES * LANES]
+                fill_node_changes(lanes, u, v, nodes == 3, rows)
+        for lane in range(count):
+            k = start + lane
+            given = (statistics[0, k], statistics[1, k], statistics[2, k])
+            five = (
+                moments[0, k], moments[1, k], moments[2, k], moments[3, k], moments[4, k],
+            )  # fmt: skip
+            ways = dressing[0, k], dressing[1, k]
+            fill_matrix(lanes, lane, given, five, ways, plan, changes, out[k])
