@@ -105,6 +105,8 @@ class FunctionSurface:
                 f"shape {found.shape}."
             )
             raise ValueError(msg)
+        if not np.isfinite(found).all():
+            _refuse_gaps(found, theta_i, theta_s, dphi)
         return found
 
     def _hemisphere(
@@ -133,6 +135,19 @@ class FunctionSurface:
             )  # fmt: skip
             total, error = total + found.estimate, error + np.abs(found.error)
         return total, error
+
+
+def _refuse_gaps(found: np.ndarray, *angles: Any) -> None:
+    """Refuse a BRDF that is nan or infinite somewhere."""
+    gaps = ~np.isfinite(found).all((-2, -1))
+    at = [float(np.broadcast_to(one, gaps.shape)[gaps][0]) for one in angles]
+    theta_i, theta_s, dphi = np.rad2deg(at)
+    msg = (
+        f"brdf of the source must be finite, {int(gaps.sum())} of {gaps.size} matrices are "
+        f"not, the first at theta_i {theta_i:.4g}, theta_s {theta_s:.4g}, dphi "
+        f"{np.mod(dphi, 360.0):.4g} degrees. Mend it there."
+    )
+    raise ValueError(msg)
 
 
 def _asked(function: Callable[..., Any], wavelength: float | None) -> tuple[str, ...]:

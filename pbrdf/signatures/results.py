@@ -63,7 +63,8 @@ class Result:
         if dataset.attrs.get("without_beam", False):
             msg = (
                 "source must hold its specular beam, which waves leave and which is not "
-                "interpolated in a store. Simulate this surface."
+                "interpolated in a store. Take computed values of all that varies, or "
+                "simulate this surface."
             )
             raise ValueError(msg)
         if "brdf_total" not in dataset:
@@ -97,13 +98,16 @@ class Result:
             chosen = here.isel(theta_i=int(found[0]))
             self._check_azimuth(phi, "sensor")
             self._check_losses(chosen)
+            _check_finite(chosen)
             return ResultSurface(chosen, phi)
         degrees = ", ".join(f"{value:.4g}" for value in np.rad2deg(zeniths))
         if sun_only is not None:
             found = np.flatnonzero(np.abs(zeniths - sun_only.theta) < 1e-6)
             if found.size:
                 self._check_azimuth(sun_only.phi, "sun")
-                return SunlitResult(here.isel(theta_i=int(found[0])), theta, phi)
+                chosen = here.isel(theta_i=int(found[0]))
+                _check_finite(chosen)
+                return SunlitResult(chosen, theta, phi)
         msg = (
             f"theta_s must be an incident zenith of the result, {degrees} degrees, got "
             f"{np.rad2deg(theta):.4g}. Simulate incidence at the zeniths of the "
@@ -156,3 +160,25 @@ class Result:
                 "emitted. Raise max_bounces or mend the scene."
             )
             warnings.warn(msg, AccuracyWarning, stacklevel=4)
+
+
+def _check_finite(chosen: xr.Dataset) -> None:
+    """Refuse gaps in a result, and tell of errors that are not known."""
+    bins = chosen.brdf_total.transpose("theta_s", "dphi", ...).to_numpy()
+    gaps = np.argwhere(~np.isfinite(bins).all((-2, -1)))
+    if len(gaps):
+        zenith, azimuth = chosen.theta_s[gaps[0][0]], chosen.dphi[gaps[0][1]]
+        msg = (
+            f"source must be finite, {len(gaps)} of {bins.shape[0] * bins.shape[1]} bins "
+            f"of brdf_total are not, the first at theta_s {np.rad2deg(float(zenith)):.4g}, "
+            f"dphi {np.rad2deg(float(azimuth)):.4g} degrees of the incidence "
+            f"{np.rad2deg(float(chosen.theta_i)):.4g}. Simulate them, or fill them."
+        )
+        raise ValueError(msg)
+    unknown = int(np.isnan(chosen.brdf_total_stderr.to_numpy()).sum())
+    if unknown:
+        msg = (
+            f"{unknown} standard errors of the result are nan: that of the signature is "
+            "not known. Simulate with more realisations."
+        )
+        warnings.warn(msg, AccuracyWarning, stacklevel=4)

@@ -1,5 +1,6 @@
 """Stokes radiance at a sensor: sun, sky and own warmth, put together."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from itertools import product
 from math import pi
@@ -11,7 +12,7 @@ import xarray as xr
 
 from pbrdf._version import __version__
 from pbrdf.conventions import STOKES
-from pbrdf.errors import require
+from pbrdf.errors import AccuracyWarning, require
 from pbrdf.signatures.function_surface import BLACK, FunctionSurface
 from pbrdf.signatures.planck import black_body, checked_temperature, tell_cold
 from pbrdf.signatures.result_surface import ResultSurface, SunlitResult
@@ -21,6 +22,8 @@ from pbrdf.signatures.sun import Sun
 
 __all__ = ["signature"]
 
+# From the far ultraviolet to the far infrared; beyond, another unit was meant [um]
+SHORTEST, LONGEST = 0.1, 100.0
 ABSOLUTE, RELATIVE = "W m-2 sr-1 um-1", "sr-1"
 LONG_NAMES = {
     "radiance": "Stokes radiance at the sensor",
@@ -91,7 +94,8 @@ def signature(  # noqa: PLR0913  (the public signature)
     -----
     AccuracyWarning
         If a result has lost light, which would count as emitted, or was traced at another
-        azimuth; if the surface is colder than 100 K.
+        azimuth; if the surface is colder than 100 K; if a wavelength lies beyond 0.1 to
+        100 um, as one in nanometres does.
 
     Examples
     --------
@@ -196,11 +200,31 @@ def _axes(
             "wavelength", wavelength, lambda v: (v > 0) & np.isfinite(v), "be > 0 [um]",
             "Wavelengths are micrometres.",
         )  # fmt: skip
+        _tell_unit(np.ravel(waves))
     for name, axis in (("theta_s", views), ("phi_s", azimuths), ("wavelength", waves)):
         if axis is not None and (axis.ndim > 1 or not axis.size):
             msg = f"{name} must be one number or a list, got shape {axis.shape}. Ravel it."
             raise ValueError(msg)
     return views, azimuths, waves
+
+
+def _tell_unit(waves: np.ndarray) -> None:
+    """Warn of wavelengths [um] that are light in another unit."""
+    beyond = waves[(waves < SHORTEST) | (waves > LONGEST)]
+    if not beyond.size:
+        return
+    one = float(beyond[0])
+    if one > LONGEST:
+        cure = f"{one:g} nm are {1e-3 * one:g} um"
+        how = f"{one / LONGEST:.3g} times the longest"
+    else:
+        cure = f"{one:g} mm are {1e3 * one:g} um"
+        how = f"{one / SHORTEST:.3g} of the shortest"
+    msg = (
+        f"wavelength is {one:g} um, {how} of light ({SHORTEST:g} to {LONGEST:g} um). "
+        f"Wavelengths are micrometres: {cure}."
+    )
+    warnings.warn(msg, AccuracyWarning, stacklevel=4)
 
 
 def _check_light(sun: Any, skies: list[Any], temperature: Any) -> None:

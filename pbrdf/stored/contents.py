@@ -137,6 +137,42 @@ class Contents:
             here.brdf_total_stderr.transpose(*order).to_numpy(),
         )
 
+    def beam(self, theta_i: np.ndarray, values: Mapping[str, Any]) -> np.ndarray:
+        """Mueller reflectance of the specular beam of waves at a computed point.
+
+        Shape (incidences, 4, 4); zero without waves. [1]
+
+        Raises
+        ------
+        ValueError
+            If it lies between computed points, or at one that is not finished.
+        """
+        if "coherent" not in self.dataset:
+            return np.zeros((len(theta_i), 4, 4))
+        apart = self.between(theta_i, values)
+        if apart:
+            msg = (
+                "the specular beam of waves must be asked for at computed points of the "
+                f"store, it is not interpolated along {', '.join(apart)}. Take one of its "
+                "values, or simulate this surface."
+            )
+            raise ValueError(msg)
+        about: dict[str, Any] = {}
+        names: tuple[str, ...] = ()
+        if self.cloud is not None:
+            names = self.cloud.names
+            place = np.array([float(values[name]) for name in names])
+            about["point"] = self.cloud.index[self.cloud.nearest(place, 1)[0]]
+        for name, one in self.parameters.items():
+            if name not in names:
+                about[one.dim] = one.nearest(values[name])
+        here = self.dataset.isel(about)
+        self._check_done(here)
+        held = self.dataset.theta_i.to_numpy()
+        rows = np.abs(held - np.reshape(theta_i, (-1, 1))).argmin(1)
+        order = ("theta_i", "stokes_out", "stokes_in")
+        return here.coherent.isel(theta_i=rows).transpose(*order).to_numpy()
+
     def source_azimuth(self, values: Mapping[str, Any]) -> float | str:
         """Azimuth of the source [rad], or "uniform"."""
         if "phi_i" in values:

@@ -78,18 +78,34 @@ class Interpolation:
         """Error of the interpolation along all parameters, by class."""
         total = np.zeros((len(CLASSES), 4, 4))
         for name, parameter in self._axes.items():
-            nodes = parameter.nodes
-            if not parameter.number or np.isclose(nodes, place[name], rtol=1e-9).any():
+            if not parameter.number:
                 continue
-            value, stderr = self._reduced(place, keep=name)
-            if len(nodes) == 2:
-                share = (place[name] - nodes[0]) / (nodes[1] - nodes[0])
-                total = np.hypot(total, midway(value[0], value[1], share))
-            else:
-                scheme = self._scheme(name)
+            if np.isclose(parameter.nodes, place[name], rtol=1e-9).any():
+                continue
+            # Others than those that are interpolated may have failed
+            keep = self._finished_about(name, place)
+            value, stderr = self._reduced(place, {name: keep})
+            nodes, scheme = parameter.nodes[keep], self._scheme(name)
+            if scheme.fits(nodes):
                 found = missed(parameter_trial(scheme, nodes, value, stderr))
-                total = np.hypot(total, along(scheme, nodes, place[name], found))
+                error = along(scheme, nodes, place[name], found)
+            elif np.isnan(self.measured[name].at_nodes).all():
+                share = (place[name] - nodes[0]) / (nodes[1] - nodes[0])
+                error = midway(value[0], value[1], share)
+            else:
+                # None to leave out here: what the axis errs by where more are finished, in
+                # the middle of its worst gap
+                error = self.measured[name].between
+            total = np.hypot(total, error)
         return total
+
+    def _finished_about(self, name: str, place: dict[str, Any]) -> np.ndarray:
+        """Return the nodes of an axis that are finished at all points about a place."""
+        stencil, _ = self._stencil(place, {name: np.arange(len(self._axes[name].nodes))})
+        axes = list(self._axes)
+        done = self._contents.finished(axes)[np.ix_(*(stencil[one] for one in axes))]
+        others = tuple(k for k, one in enumerate(axes) if one != name)
+        return np.flatnonzero(done.all(others))
 
     @property
     def _axes(self) -> dict[str, Parameter]:
@@ -97,9 +113,15 @@ class Interpolation:
         return self._contents.parameters
 
     def _middle(self) -> dict[str, np.ndarray]:
-        """Return the middle of all axes, or the finished point that is nearest to it."""
+        """Return the middle of all axes, or the finished point nearest to it.
+
+        Of those where most nodes along the axes are finished: most can be left out there.
+        """
         middle = np.array([(len(p.nodes) - 1) // 2 for p in self._axes.values()], dtype=int)
-        done = np.argwhere(self._contents.finished(self._axes))
+        finished = self._contents.finished(self._axes)
+        held = sum(finished.sum(k, keepdims=True) for k in range(finished.ndim))
+        held = np.where(finished, held, 0)
+        done = np.argwhere(finished & (held == held.max(initial=0)))
         if len(done):
             middle = done[np.argmin(np.abs(done - middle).sum(-1))]
         return {n: np.array([at]) for n, at in zip(self._axes, middle, strict=True)}
@@ -110,14 +132,17 @@ class Interpolation:
         return np.flatnonzero(self._contents.finished(self._axes)[here])
 
     def _stencil(
-        self, place: dict[str, Any], keep: str | None
+        self, place: dict[str, Any], keep: dict[str, np.ndarray]
     ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-        """Return indices and weights of the points about a place, along each axis."""
+        """Return indices and weights of the points about a place, along each axis.
+
+        Of axes in `keep` the nodes that are given there, without weights.
+        """
         stencil: dict[str, np.ndarray] = {}
         weights: dict[str, np.ndarray] = {}
         for name, parameter in self._axes.items():
-            if name == keep:
-                stencil[name] = np.arange(len(parameter.nodes))
+            if name in keep:
+                stencil[name] = keep[name]
             elif parameter.number and len(parameter.nodes) > 1:
                 index, weight = self._scheme(name).weights(parameter.nodes, place[name])
                 # Points that count for nothing need not be finished
@@ -128,13 +153,14 @@ class Interpolation:
         return stencil, weights
 
     def _reduced(
-        self, place: dict[str, Any], keep: str | None = None
+        self, place: dict[str, Any], keep: dict[str, np.ndarray] | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Hemispheres of all incidences at a place; along one parameter all its nodes."""
+        """Hemispheres of all incidences at a place; along one parameter at its nodes."""
+        keep = keep or {}
         stencil, weights = self._stencil(place, keep)
         value, stderr = self._contents.read(stencil)
         for axis, name in reversed(list(enumerate(stencil))):
-            if name == keep:
+            if name in keep:
                 continue
             # Stokes axes are last, the axis that goes before them
             value, stderr = combined(

@@ -93,6 +93,12 @@ class Parameter:
         last = int(np.searchsorted(self.nodes, each.max(), "left"))
         return list(range(first, last + 1))
 
+    def nearest(self, value: Any) -> int:
+        """Return the number of the node at a value that `check` lets pass."""
+        if not self.number:
+            return self.around(value)[0]
+        return int(np.abs(self.nodes - float(self.check(value))).argmin())
+
     def _same(self, one: Any, value: Any) -> bool:
         if self.nodes.dtype.kind != "f":
             return str(one) == str(value)

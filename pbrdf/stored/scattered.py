@@ -41,7 +41,7 @@ class ScatteredInterpolation(Interpolation):
         return super()._middle() | {"point": middle}
 
     def _stencil(
-        self, place: dict[str, Any], keep: str | None
+        self, place: dict[str, Any], keep: dict[str, np.ndarray]
     ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
         stencil, weights = super()._stencil(place, keep)
         cloud = self._chosen[0]

@@ -1,5 +1,6 @@
 """The store of a sweep as a BRDF of angles, wavelength and whatever the sweep varied."""
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from pbrdf.conventions import RESULT_VARIABLES, STOKES
-from pbrdf.errors import require
+from pbrdf.errors import AccuracyWarning, require
 from pbrdf.stored.contents import Contents
 from pbrdf.stored.interpolation import Interpolation
 from pbrdf.stored.left_out import CLASSES, error_of_albedo
@@ -29,7 +30,7 @@ class StoredBRDF:
     several, and what the sweep varied by its name without unit: angles in radians, lengths
     in um.
     All are broadcast; those of which the store has one value may be left out. The specular
-    beam of a sweep with waves is none of it: read `coherent` of the store.
+    beam of a sweep with waves is none of it: it is `coherent`, at computed points only.
 
     Examples
     --------
@@ -139,6 +140,32 @@ class StoredBRDF:
         _, stderr, between = self._evaluated(at, wavelength, parameters, error=True)
         return np.hypot(2.0 * stderr, between)
 
+    def coherent(
+        self,
+        theta_i: npt.ArrayLike,
+        wavelength: float | None = None,
+        **parameters: Any,
+    ) -> np.ndarray:
+        """Mueller reflectance of the specular beam that waves leave, zero of rays. [1]
+
+        Shape (..., 4, 4), with the shape of `theta_i`; one value of all else.
+
+        Raises
+        ------
+        ValueError
+            If incidence, wavelength or a parameter lies between computed ones: the beam is
+            not interpolated.
+        """
+        given = parameters
+        if wavelength is not None and not self._is_the_one(wavelength):
+            given = parameters | {"wavelength": wavelength}
+        angles = self._angles(theta_i, 0.0, 0.0)[0]
+        # Incidences that are rounded are those of the store, as of `brdf`
+        near = self._theta_i[np.abs(self._theta_i - angles[..., None]).argmin(-1)]
+        angles = np.where(np.abs(near - angles) < 1e-6, near, angles)
+        found = self._contents.beam(angles.ravel(), self._contents.named(given))
+        return found.reshape(*angles.shape, 4, 4)
+
     def at(
         self,
         theta_i: npt.ArrayLike | None = None,
@@ -169,7 +196,13 @@ class StoredBRDF:
             hemisphere if errors of interpolation are alike everywhere and those of the
             simulation independent. The attribute `interpolated_along` names the axes whose
             values were not computed; `most_lost` is the largest share of light that was
-            lost at the points about it, `phi_i` the azimuth of the source.
+            lost at the points about it, `phi_i` the azimuth of the source. Of waves
+            `coherent` too, at computed points.
+
+        Warns
+        -----
+        AccuracyWarning
+            If the specular beam of waves is left out, between computed points.
         """
         for parameter, one in parameters.items():
             if np.ndim(one):
@@ -179,6 +212,8 @@ class StoredBRDF:
         incidences = np.atleast_1d(self._theta_i if theta_i is None else theta_i)
         known = self._contents.parameters.get("wavelength")
         waves = None if known is None else known.nodes if wavelength is None else wavelength
+        if known is None and wavelength is not None and not self._is_the_one(wavelength):
+            self._contents.named(parameters | {"wavelength": wavelength})
         grid = np.meshgrid(incidences, data.theta_s, data.dphi, indexing="ij")
         each = [None] if waves is None else np.atleast_1d(waves).tolist()
         found = [
@@ -225,8 +260,33 @@ class StoredBRDF:
         # What a signature asks of a result beside its bins
         out.attrs["phi_i"] = self._contents.source_azimuth(named)
         out.attrs["most_lost"] = self._contents.most_lost(named)
-        out.attrs["without_beam"] = "coherent" in data
+        out.attrs["without_beam"] = "coherent" in data and bool(along)
+        if "coherent" in data:
+            self._add_beam(out, incidences, each, parameters, along)
         return out
+
+    def _add_beam(
+        self,
+        out: xr.Dataset,
+        incidences: np.ndarray,
+        waves: list[Any],
+        parameters: dict[str, Any],
+        along: tuple[str, ...],
+    ) -> None:
+        """Add the specular beam at computed points; tell that it is left out elsewhere."""
+        if along:
+            msg = (
+                "the specular beam of waves is left out: it is not interpolated, and "
+                f"{', '.join(along)} lie between computed values. Take one of them."
+            )
+            warnings.warn(msg, AccuracyWarning, stacklevel=4)
+            return
+        beams = [self.coherent(incidences, wave, **parameters) for wave in waves]
+        of = ("theta_i", "wavelength") if "wavelength" in out.dims else ("theta_i",)
+        beam = np.stack(beams, axis=1) if len(of) == 2 else beams[0]
+        entry = RESULT_VARIABLES["coherent"]
+        about = {"units": entry.units, "long_name": entry.long_name}
+        out["coherent"] = ((*of, "stokes_out", "stokes_in"), beam, about)
 
     def plot(
         self,

@@ -67,7 +67,7 @@ def run_sweep(
     """
     _check_part(part, replace=replace)
     cores = worker_count(workers)
-    store = open_store(path, sweep, replace=replace)
+    store = open_store(path, sweep, replace=replace, shared=part is not None)
     mine = range(store.layout.n_groups)
     if part is not None:
         mine = mine[part[0] - 1 :: part[1]]

@@ -166,8 +166,10 @@ def complete(block: dict[str, np.ndarray]) -> bool:
     return not (block[STATE] == FAILED).any()
 
 
-def open_store(path: str | Path, sweep: Sweep, *, replace: bool = False) -> Store:
-    """Open the store of a sweep, made if there is none.
+def open_store(
+    path: str | Path, sweep: Sweep, *, replace: bool = False, shared: bool = False
+) -> Store:
+    """Open the store of a sweep, made if there is none; `shared` by parts of the sweep.
 
     Raises
     ------
@@ -185,7 +187,11 @@ def open_store(path: str | Path, sweep: Sweep, *, replace: bool = False) -> Stor
             msg = (
                 f"output must be a new store or that of this sweep, got {path}, which is "
                 "bound to another one: scene, values, [simulate], files or version differ. "
-                "Name another, or use --force to replace it."
+                + (
+                    "Name another, or delete it before the first part."
+                    if shared
+                    else "Name another, or use --force to replace it."
+                )
             )
             raise ValueError(msg)
         shutil.rmtree(path)

@@ -131,15 +131,12 @@ def test_a_result_that_is_warm(folder: Path, capsys: pytest.CaptureFixture) -> N
         (["model.toml", *NOON, "--sun-azimuth-deg", "3"], "and --sun-azimuth-deg"),
         (["model.toml", "--sun-zenith-deg", "30", "--view-azimuth-deg", "800"], "got 800."),
         (["model.toml", "--sun-zenith-deg", "30", *WARM], "--planck-sun must be given"),
-        (["swept.zarr", "--sun-zenith-deg", "30"], "is the store of a sweep"),
+        (["model.toml", "--sun-zenith-deg", "30", "--at", "n=2"], "is for a store of a s"),
     ],
 )
 def test_refusals_name_options(
     folder: Path, capsys: pytest.CaptureFixture, arguments: list[str], words: str
 ) -> None:
-    (folder / "swept.zarr").mkdir()
-    bound = '{"zarr_format": 3, "node_type": "group", "attributes": {"pbrdf_sweep": "1"}}'
-    (folder / "swept.zarr" / "zarr.json").write_text(bound)
     assert main(["radiance", *arguments]) == 2
     said = capsys.readouterr().err
     assert words in said

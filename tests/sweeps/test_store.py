@@ -102,6 +102,15 @@ def test_parts_make_the_whole(whole: Path, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="replace must be False with part"):
         run_sweep(sweep, path, part=(1, 4), replace=True)
     assert run_sweep(sweep, path, part=(1, 4)).computed == 0
+    # Nor may they replace the store of another sweep one after the other
+    text = (tmp_path / "sweep.toml").read_text()
+    (tmp_path / "other.toml").write_text(text.replace("n_rays = 200", "n_rays = 201"))
+    other = load_sweep(tmp_path / "other.toml")
+    with pytest.raises(ValueError, match="or delete it before the first part") as told:
+        run_sweep(other, path, part=(1, 4))
+    assert "--force" not in str(told.value)
+    with pytest.raises(ValueError, match="or use --force to replace it"):
+        run_sweep(other, path)
 
 
 def test_another_sweep_and_other_folders_are_refused(whole: Path, tmp_path: Path) -> None:

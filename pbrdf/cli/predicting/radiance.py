@@ -18,7 +18,8 @@ def command(
     source: Annotated[
         Path,
         typer.Argument(
-            help="Model (.toml) of a fit, or result (.nc, .zarr) of simulate.",
+            help="Model (.toml) of a fit, result (.nc, .zarr) of simulate, or store of a "
+            "sweep (.zarr) with --at.",
             show_default=False,
         ),
     ],
@@ -123,6 +124,7 @@ def command(
             "--wavelength-um that cover it."
         ),
     ] = None,
+    at: options.At = None,
     output: options.Output = None,
     force: options.Force = False,
 ) -> None:
@@ -130,7 +132,8 @@ def command(
 
     Q is along the horizontal, U half way from right to up, V right-circular as the sensor
     sees them. A result is known at its incident zeniths: simulate those of the sensor, or,
-    for sunlight alone, that of the sun.
+    for sunlight alone, that of the sun. A store is interpolated at --at and at the zeniths
+    of the sensor.
 
     Example: pbrdf radiance model.toml --sun-zenith-deg 40 --sky rayleigh --wavelength-um 1
     """
@@ -166,9 +169,10 @@ def command(
     if target.suffix not in (".csv", ".nc"):
         msg = f"--output must end in .csv or .nc, got {target.name}."
         raise ValueError(msg)
+    surface = _read(source, at, views, waves)
     with staged_file(target, force=force) as stage:
         seen = pbrdf.signature(
-            _read(source), views, phi_s=azimuths, wavelength=waves, sun=sun,
+            surface, views, phi_s=azimuths, wavelength=waves, sun=sun,
             sky=skies or None, temperature=temperature,
         )  # fmt: skip
         if response is not None:
@@ -212,17 +216,18 @@ def _check_relative(absolute: dict[str, Any]) -> None:
             raise ValueError(msg)
 
 
-def _read(source: Path) -> Any:
-    """Read a model or a result by the end of its name."""
+def _read(
+    source: Path, at: list[str] | None, views: list[float], waves: list[float] | None
+) -> Any:
+    """Read a model or a result by the end of its name; of a store the surface at `at`."""
     from data_io import read_model, read_result
     from pbrdf.files import read_toml
     from pbrdf.stored.whole import is_sweep_store
 
     if is_sweep_store(source):
-        msg = (
-            f"source must be one surface, {source.name} is the store of a sweep. Take one "
-            "in Python: pbrdf.signature(pbrdf.from_store(path).at(...), ...)."
-        )
+        return _surface_of(source, at, views, waves)
+    if at:
+        msg = f"--at must be left out, it is for a store of a sweep, got {source.name!r}."
         raise ValueError(msg)
     if source.suffix in (".nc", ".zarr"):
         return read_result(source)
@@ -238,6 +243,34 @@ def _read(source: Path) -> Any:
         )
         raise ValueError(msg)
     return read_model(source)
+
+
+def _surface_of(
+    store: Path, at: list[str] | None, views: list[float], waves: list[float] | None
+) -> "xr.Dataset":
+    """Interpolate a store at the zeniths of the sensor, its incidences by reciprocity."""
+    from math import degrees
+
+    from pbrdf import from_store
+    from pbrdf.cli.places import written_places
+
+    places = written_places(at, "Give --view-zenith-deg.")
+    if "wavelength" in places:
+        msg = "--at must leave the wavelength out, it is that of --wavelength-um."
+        raise ValueError(msg)
+    held = from_store(store)
+    low, high = held.ranges["theta_i"]
+    for view in views:
+        if not low - 1e-6 <= view <= high + 1e-6:
+            msg = (
+                f"--view-zenith-deg must lie within the incidences of the store, "
+                f"{degrees(low):.6g} to {degrees(high):.6g} degrees, got "
+                f"{degrees(view):.6g}."
+            )
+            raise ValueError(msg)
+    # A store of one wavelength, or of none, is checked by the signature
+    known = waves if "wavelength" in held.ranges else None
+    return held.at(sorted(set(views)), known, **places)
 
 
 def _table(seen: "xr.Dataset") -> "pd.DataFrame":
