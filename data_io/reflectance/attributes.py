@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,15 @@ import numpy as np
 import xarray as xr
 import xxhash
 
-__all__ = ["CHECKSUMS", "OF_ATTRS", "decode", "digest", "digest_of_attrs", "encode"]
+__all__ = [
+    "CHECKSUMS",
+    "OF_ATTRS",
+    "decode",
+    "digest",
+    "digest_of_attrs",
+    "digests",
+    "encode",
+]
 
 # Marks an attribute that netCDF cannot hold as it is: truth values, None, lists, mappings
 _JSON = "json:"
@@ -33,18 +41,27 @@ def digest(variable: xr.Variable, like: str = _XXH3) -> str:
         A checksum of the kind wanted: SHA-256, which files of earlier versions have, is
         without a mark.
     """
-    values = variable.to_numpy()
-    text = values.dtype.kind in "OTU"
-    kind = "text" if text else values.dtype.str
-    head = f"{variable.dims} {values.shape} {kind} {_in_order(variable.attrs)}"
+    return next(digests(variable, [()], like))
+
+
+def digests(
+    variable: xr.Variable, places: Iterable[tuple[slice, ...]], like: str = _XXH3
+) -> Iterator[str]:
+    """Yield the checksum of each part of a variable, told by its slices."""
+    whole = variable.to_numpy()
+    text = whole.dtype.kind in "OTU"
+    kind = "text" if text else whole.dtype.str
+    attrs = _in_order(variable.attrs)
     fast = like.startswith(_XXH3)
-    found = xxhash.xxh3_128() if fast else hashlib.sha256()
-    found.update(head.encode() + b"\0")
-    if text:
-        found.update("\0".join(map(str, values.reshape(-1))).encode())
-    else:
-        _add(found, values)
-    return _XXH3 * fast + found.hexdigest()
+    for place in places:
+        values = whole[(*place, ...)]
+        found = xxhash.xxh3_128() if fast else hashlib.sha256()
+        found.update(f"{variable.dims} {values.shape} {kind} {attrs}".encode() + b"\0")
+        if text:
+            found.update("\0".join(map(str, values.reshape(-1))).encode())
+        else:
+            _add(found, values)
+        yield _XXH3 * fast + found.hexdigest()
 
 
 def _add(found: Any, values: np.ndarray) -> None:

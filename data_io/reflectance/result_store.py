@@ -18,8 +18,8 @@ import xarray as xr
 from data_io.reflectance.attributes import (
     CHECKSUMS,
     OF_ATTRS,
-    digest,
     digest_of_attrs,
+    digests,
     encode,
 )
 from pbrdf.errors import DataFileError
@@ -35,8 +35,12 @@ __all__ = ["fill_store", "is_result_store", "read_store", "write_store"]
 ALONG, WITHIN = "theta_i", "wavelength"
 # Stands among the names of variables: the size of a group of wavelengths
 _GROUP = "./wavelength"
+# Whoever runs this has so much memory; to ask takes a millisecond [bytes]
+_SMALL = 64 * 2**20
 # Larger chunks are cut further [bytes]
 _CHUNK = 64 * 2**20
+# A folder for each variable, not one for each index of each piece
+_FLAT = {"name": "default", "separator": "."}
 # Counts that parts have each their own of
 _SUMMED = ("path_segments", "self_hits", "exact_searches", "medium_mismatches")
 
@@ -144,7 +148,7 @@ def read_store(path: str | Path) -> xr.Dataset:
         problem = f"cannot be read: {first_line(error)}"
         place = _unreadable(path)
         raise DataFileError(path, problem, DAMAGED, column=place) from error
-    if stored.nbytes > SHARE * free_bytes():
+    if stored.nbytes > _SMALL and stored.nbytes > SHARE * free_bytes():
         problem = f"it takes {told(stored.nbytes)}, more than the memory that is free"
         raise DataFileError(path, problem, "Read parts of it by xarray.open_zarr.")
     if names.pop(OF_ATTRS, [digest_of_attrs(stored.attrs)])[0] != digest_of_attrs(
@@ -200,7 +204,7 @@ def _write_part(part: xr.Dataset, folder: Path, first: Mapping[str, int] | None)
     with _quiet():
         if first is None:
             encoding = {
-                name: {"chunks": _chunks(variable)}
+                name: {"chunks": _chunks(variable), "chunk_key_encoding": _FLAT}
                 for name, variable in encoded.variables.items()
                 if variable.ndim
             }
@@ -238,16 +242,21 @@ def _digests(
     variable: xr.Variable, first: Mapping[str, int], group: int = 0, *like: str
 ) -> dict[tuple[int, ...], str]:
     """Return checksums by place: of each direction, and each group of wavelengths."""
-    found = {}
     sides = [(d, variable.sizes[d]) for d in (ALONG, WITHIN) if d in variable.dims]
     steps = {ALONG: 1, WITHIN: group or max(variable.sizes.get(WITHIN, 1), 1)}
+    keys, places = [], []
     for place in product(*(range(0, size, steps[dim]) for dim, size in sides)):
-        own = {
-            dim: slice(k, k + steps[dim]) for (dim, _), k in zip(sides, place, strict=True)
-        }
-        key = tuple(k + first.get(dim, 0) for (dim, _), k in zip(sides, place, strict=True))
-        found[key] = digest(variable.isel(own), *like)
-    return found
+        starts = {dim: k for (dim, _), k in zip(sides, place, strict=True)}
+        keys.append(tuple(k + first.get(dim, 0) for dim, k in starts.items()))
+        places.append(
+            tuple(
+                slice(starts[dim], starts[dim] + steps[dim])
+                if dim in starts
+                else slice(None)
+                for dim in map(str, variable.dims)
+            )
+        )
+    return dict(zip(keys, digests(variable, places, *like), strict=True))
 
 
 def _joined(whole: dict[str, Any], part: dict[str, Any], *, anew: bool) -> dict[str, Any]:

@@ -100,9 +100,7 @@ def test_groups_of_wavelengths_are_put_together(tmp_path):
     # Rays of a direction are counted once, not once a group
     assert together.attrs["path_segments"] == 20
     for name in ("brdf", "albedo", "seen", "wavelength"):
-        chunk = max(
-            path for path in (tmp_path / "r.zarr" / name / "c").rglob("*") if path.is_file()
-        )
+        chunk = max((tmp_path / "r.zarr" / name).glob("c*"))
         content = chunk.read_bytes()
         chunk.write_bytes(content[:-3])
         with pytest.raises(DataFileError, match=f"variable {name}:"):
@@ -136,8 +134,7 @@ def test_nothing_else_is_replaced(tmp_path):
 def test_damage_is_named_by_its_variable(tmp_path):
     target = tmp_path / "r.zarr"
     write_result(small(), target)
-    chunks = sorted(path for path in target.rglob("c/*") if path.is_file())
-    chunks += sorted(path for path in target.rglob("c/*/*/*") if path.is_file())
+    chunks = sorted(target.glob("*/c*"))
     assert len(chunks) > 4
     rng = np.random.default_rng(5)
     for chunk in chunks:
@@ -157,7 +154,7 @@ def test_damage_is_named_by_its_variable(tmp_path):
 def test_a_swapped_direction_is_seen(tmp_path):
     target = tmp_path / "r.zarr"
     write_result(small(), target)
-    one, two = (target / "brdf/c/0" / k / "0" for k in "01")
+    one, two = (target / f"brdf/c.0.{k}.0" for k in "01")
     held = one.read_bytes()
     one.write_bytes(two.read_bytes())
     two.write_bytes(held)
