@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from data_io.goniometer.scan import INTENSITIES, NORMALISED, STDERR, Scan
-from data_io.goniometer.scatter import curve_keys, standard_errors
+from data_io.goniometer.scatter import standard_errors
 
 __all__ = ["check_agreement", "check_fractions", "check_parts", "errors_of"]
 
@@ -35,12 +35,9 @@ _SUMS: dict[str, tuple[dict[str, float], ...]] = {
 
 def errors_of(scan: Scan, name: str) -> np.ndarray:
     """Return the standard errors of a column: as stated, by its scatter, or NaN."""
-    curve, view = curve_keys(
-        scan.theta_i, scan.theta_s, scan.dphi, scan.phi_i, scan.wavelength
-    )
     stated = scan.values.get(name + STDERR)
     brightness = scan.values.get("M00")
-    return standard_errors(scan.values[name], stated, curve, view, brightness=brightness)
+    return standard_errors(scan.values[name], stated, *scan.curves, brightness=brightness)
 
 
 def check_agreement(scan: Scan) -> None:

@@ -227,10 +227,11 @@ def _check_normalisation(scan: Scan) -> None:
     intensity = scan.values.get("M00")
     if intensity is None:
         return
+    own = np.nan_to_num(errors_of(scan, "M00"))
     for name in ELEMENTS[1:]:
         if name not in scan.values:
             continue
-        error = np.hypot(*(np.nan_to_num(errors_of(scan, n)) for n in (name, "M00")))
+        error = np.hypot(np.nan_to_num(errors_of(scan, name)), own)
         larger = np.abs(scan.values[name]) > intensity + _FAR * error
         compared = np.isfinite(scan.values[name]) & np.isfinite(intensity)
         if compared.any() and larger.sum() > 0.5 * compared.sum():

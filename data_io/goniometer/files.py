@@ -1,6 +1,7 @@
 """Reading and writing of goniometer files; which format a file has."""
 
 from collections.abc import Mapping
+from itertools import islice
 from pathlib import Path
 
 import xarray as xr
@@ -12,7 +13,7 @@ from data_io.goniometer.scan import QUANTITIES
 from data_io.goniometer.tables import own_csv
 from data_io.goniometer.tables.quantities import as_declared
 from data_io.goniometer.tables.writing import write_csv
-from data_io.text.text import Line, read_lines, without_comments
+from data_io.text.text import Line, content_of, read_lines
 from pbrdf.errors import DataFileError
 
 # In the order in which they are tried: a table of columns is the last resort
@@ -185,13 +186,13 @@ def write_goniometer(dataset: xr.Dataset, path: str | Path) -> None:
 
 def _detect(path: Path, lines: list[Line]) -> str:
     """Tell the format from the content."""
-    content = without_comments(lines)
+    content = list(islice(content_of(lines), 20))
     if not content:
         problem = "expected rows of a scan, found comments only"
         raise DataFileError(path, problem, "The file is truncated.")
     first = content[0].text.strip()
     for word, what in _FOREIGN.items():
-        if any(line.text.strip().startswith(word) for line in content[:20]):
+        if any(line.text.strip().startswith(word) for line in content):
             problem = f"expected a goniometer file in a known format, got {what}"
             cure = f"Export a table; known are {', '.join(_FORMATS)} and .pbsdf."
             raise DataFileError(path, problem, cure, line=content[0].number)

@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from data_io.goniometer.scatter import curve_keys
 from pbrdf.errors import DataFileError
 
 ELEMENTS = tuple(f"M{i}{j}" for i in range(4) for j in range(4))
@@ -79,6 +81,12 @@ class Scan:
     angles_declared: bool = False
     names: Mapping[str, str] = field(default_factory=dict)
     attrs: Mapping[str, object] = field(default_factory=dict)
+
+    @cached_property
+    def curves(self) -> tuple[np.ndarray, np.ndarray]:
+        """The curve that each reading lies on, and its place along it (`curve_keys`)."""
+        others = (self.phi_i, self.wavelength)
+        return curve_keys(self.theta_i, self.theta_s, self.dphi, *others)
 
     def fault(
         self, rows: np.ndarray, column: str, problem: str, cure: str

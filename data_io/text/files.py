@@ -46,11 +46,12 @@ def read_texts(path: str | Path) -> list[str]:
     if text is None or _CONTROL.search(text):
         problem = "expected a text file, found binary data"
         raise DataFileError(path, problem, "Give the text export of the instrument.")
-    # Programs that join files leave a mark of each
-    text = _MICRO.sub("\u00b5", text.replace("\ufeff", ""))
-    for plain, signs in _TYPESET.items():
-        for sign in signs:
-            text = text.replace(sign, plain)
+    if not text.isascii():
+        # Programs that join files leave a mark of each
+        text = _MICRO.sub("\u00b5", text.replace("\ufeff", ""))
+        for plain, signs in _TYPESET.items():
+            for sign in signs:
+                text = text.replace(sign, plain)
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 

@@ -1,8 +1,8 @@
 """Text files in, with a line number for everything that is wrong in them."""
 
 import re
-from collections.abc import Iterable, Sequence
-from itertools import pairwise
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import count, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -52,7 +52,7 @@ class Rows(NamedTuple):
 
 def read_lines(path: str | Path) -> list[Line]:
     """Return all lines of a text file; refuse an empty or a binary one."""
-    return [Line(i, text) for i, text in enumerate(read_texts(path), start=1)]
+    return list(map(Line, count(1), read_texts(path)))
 
 
 def is_comment(line: Line) -> bool:
@@ -62,7 +62,15 @@ def is_comment(line: Line) -> bool:
 
 def without_comments(lines: Iterable[Line]) -> list[Line]:
     """Return the lines that say something and are no comments."""
-    return [line for line in lines if line.text.strip() and not is_comment(line)]
+    return list(content_of(lines))
+
+
+def content_of(lines: Iterable[Line]) -> Iterator[Line]:
+    """Yield the lines that say something and are no comments."""
+    for line in lines:
+        first = line.text.lstrip()[:1]
+        if first and first not in COMMENT_MARKS:
+            yield line
 
 
 def is_number(cell: str) -> bool:

@@ -158,7 +158,9 @@ def check_columns(path: str | Path, lines: Iterable[str]) -> None:
         If a line has more than 10 000.
     """
     for number, line in enumerate(lines, 1):
-        cells = 1 + max(map(line.count, ",;\t")) if len(line) > MOST_CELLS else 1
+        if len(line) <= MOST_CELLS:
+            continue
+        cells = 1 + max(map(line.count, ",;\t"))
         if cells > MOST_CELLS:
             problem = f"expected at most {MOST_CELLS} columns, got {cells}"
             raise DataFileError(path, problem, "Is it a table?", line=number)

@@ -199,6 +199,7 @@ def test_hostile_stores_are_refused(tmp_path, kind):
 def test_a_store_larger_than_memory_is_refused(tmp_path, monkeypatch):
     write_result(small(), tmp_path / "r.zarr")
     monkeypatch.setattr("data_io.reflectance.result_store.free_bytes", lambda: 100.0)
+    monkeypatch.setattr("data_io.reflectance.result_store._SMALL", 0)
     with pytest.raises(DataFileError, match=r"xarray\.open_zarr"):
         read_result(tmp_path / "r.zarr")
 

@@ -17,7 +17,7 @@ import numpy as np
 from data_io.goniometer.declarations import Declared
 from data_io.goniometer.scan import ConventionWarning, Scan
 from data_io.goniometer.tables.angles import relative_azimuth
-from data_io.text.text import Line, is_number, without_comments
+from data_io.text.text import Line, content_of, is_number
 from pbrdf.errors import DataFileError
 
 _OPTION = re.compile(r"(\w+)\s*=\s*(\S+)")
@@ -29,7 +29,7 @@ NAME, TAKES = "fred", ("azimuth_of_forward",)
 
 def looks_like(lines: list[Line]) -> bool:
     """Tell whether the first line is that of a FRED scatter table."""
-    return without_comments(lines)[0].text.split()[:2] == ["type", "bsdf_data"]
+    return next(content_of(lines)).text.split()[:2] == ["type", "bsdf_data"]
 
 
 def read(path: Path, lines: list[Line], declared: Declared) -> Scan:

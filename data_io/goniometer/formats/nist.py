@@ -32,7 +32,7 @@ import numpy as np
 from data_io.goniometer.declarations import Declared
 from data_io.goniometer.frames import rotation
 from data_io.goniometer.scan import ELEMENTS, Scan
-from data_io.text.text import Line, Rows, is_comment, read_numbers, without_comments
+from data_io.text.text import Line, Rows, content_of, read_numbers, without_comments
 from pbrdf.errors import DataFileError
 
 _GEOMETRY = ("lambda", "thetai", "phii", "thetar", "phir")
@@ -46,13 +46,13 @@ NAME, TAKES = "nist", ()
 
 def looks_like(lines: list[Line]) -> bool:
     """Tell whether the header is that of the NIST table."""
-    header = without_comments(lines)[0]
+    header = next(content_of(lines))
     return header.text.replace(" ", "").lower().startswith("lambda,thetai")
 
 
 def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     """Read the table."""
-    content = [line for line in lines if line.text.strip() and not is_comment(line)]
+    content = without_comments(lines)
     names = [cell.strip() for cell in content[0].text.split(",")]
     _check_header(path, content[0], names)
     if len(content) < 2:

@@ -12,7 +12,7 @@ import numpy as np
 from data_io.goniometer.declarations import Declared
 from data_io.goniometer.remarks.settings import one_wavelength
 from data_io.goniometer.scan import Scan
-from data_io.text.text import Line, Rows, is_comment, read_numbers
+from data_io.text.text import Line, Rows, is_comment, read_numbers, without_comments
 from pbrdf.errors import DataFileError
 
 _COLUMNS = ["phi_i", "theta_i", "phi_o", "theta_o", "brdf"]
@@ -25,14 +25,17 @@ NAME, TAKES = "spacecraft", ()
 
 def looks_like(lines: list[Line]) -> bool:
     """Tell whether a comment names the columns."""
-    comments = filter(is_comment, lines)
-    return any(line.text.strip("#% \t").split() == _COLUMNS for line in comments)
+    return any(
+        is_comment(line) and line.text.strip("#% \t").split() == _COLUMNS
+        for line in lines
+        if _COLUMNS[0] in line.text
+    )
 
 
 def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     """Read the five columns."""
     comments = [line.text.strip("#% \t") for line in lines if is_comment(line)]
-    data = [line for line in lines if line.text.strip() and not is_comment(line)]
+    data = without_comments(lines)
     if not data:
         problem = "expected rows below the comments, found none"
         raise DataFileError(path, problem, "The file is truncated.")

@@ -34,14 +34,14 @@ NAME, TAKES = "zemax", ()
 
 def looks_like(lines: list[Line]) -> bool:
     """Tell whether the lines without comments are a Zemax table."""
-    content = without_comments(lines)
-    return any(line.text.split()[:1] == ["ScatterRadial"] for line in content)
+    word = "ScatterRadial"
+    return any(word in line.text and line.text.split()[:1] == [word] for line in lines)
 
 
 def read(path: Path, lines: list[Line], declared: Declared) -> Scan:
     """Read the table; warn where its TIS is not its integral."""
     comments = [line.text.strip("# \t") for line in lines if is_comment(line)]
-    content = [line for line in lines if line.text.strip() and not is_comment(line)]
+    content = without_comments(lines)
     begin = next((i for i, line in enumerate(content) if _word(line) == "DataBegin"), None)
     end = next((i for i, line in enumerate(content) if _word(line) == "DataEnd"), None)
     if begin is None or end is None:

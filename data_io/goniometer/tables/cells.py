@@ -15,14 +15,20 @@ from data_io.text.text import is_number
 from pbrdf.errors import DataFileError
 
 __all__ = [
-    "cells_of", "is_plain", "numbers_of", "require_one_notation", "separator_of",
-    "sign_behind", "without_counter", "without_empty_end",
+    "cells_of", "is_plain", "numbers_of", "plain_row", "require_one_notation",
+    "separator_of", "sign_behind", "without_counter", "without_empty_end",
 ]  # fmt: skip
 
 _SEPARATORS = (";", "\t", "|", ",")
 _COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 _POINT = re.compile(r"[-+]?(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_PLAIN = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _PARTED = re.compile(r"[-+]?0\d+")
+_ANY_PARTED = re.compile(rf"^{_PARTED.pattern}$", re.MULTILINE)
+# With a point of thousands, or below a thousand
+_DOTTED = re.compile(r"[-+]?[1-9]\d{0,2}\.\d{3}")
+_WHOLE = re.compile(r"[-+]?[1-9]\d{2}")
+_ANY_WHOLE = re.compile(rf"^{_WHOLE.pattern}$", re.MULTILINE)
 # Signs that programs put behind numbers, and the unit that they mean
 _SIGNS = {"%": "%", "°": "deg", "º": "deg"}
 
@@ -55,6 +61,18 @@ def cells_of(text: str, separator: str | None) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
+def plain_row(separator: str | None, width: int) -> re.Pattern[str]:
+    """Return the pattern of a row of numbers with points, in which nothing is to be judged.
+
+    Its cells are what stands between the separators, without spaces.
+    """
+    between = r"[ \t]+" if separator is None else f" *{re.escape(separator)} *"
+    around = r"[ \t]*" if separator is None else " *"
+    return re.compile(
+        rf"{around}{_PLAIN}(?:{between}{_PLAIN}){{{width - 1}}}{around}", re.ASCII
+    )
+
+
 def is_plain(cell: str) -> bool:
     """Tell whether a cell is a number in either notation, with or without a sign behind."""
     bare = cell.rstrip("%°º ") if cell[-1:] in _SIGNS else cell
@@ -77,7 +95,9 @@ def numbers_of(text: pd.Series) -> tuple[np.ndarray, np.ndarray]:
         pointed = other.str.replace(",", ".", regex=False)
         pointed = pointed.where(other.str.fullmatch(_COMMA), other)
         numbers[gone] = pd.to_numeric(pointed, errors="coerce").to_numpy(float)
-    rest = np.isnan(numbers) | text.str.contains("_", regex=False).to_numpy(bool)
+    rest = np.isnan(numbers)
+    if "_" in "\n".join(text.tolist()):
+        rest |= text.str.contains("_", regex=False).to_numpy(bool)
     gaps = np.zeros(rest.size, dtype=bool)
     gaps[rest] = [is_gap(cell) for cell in text.to_numpy()[rest]]
     return np.where(gaps, np.nan, numbers), rest & ~gaps
@@ -132,20 +152,21 @@ def require_one_notation(
         Naming the first comma that can be read in two ways.
     """
     comma, decimal, point, parted = None, False, None, None
-    for name, text in columns:
-        if separator == "," and parted is None:
-            zeros = text.str.fullmatch(_PARTED).to_numpy(bool)
-            row = int(zeros.argmax())
-            parted = (name, lines[row], text.iloc[row]) if zeros.any() else None
-        for row in np.flatnonzero(text.str.contains(",", regex=False)).tolist():
-            cell = text.iloc[row]
+    for name, column in columns:
+        cells = column.tolist()
+        # Most columns show at once that none of their cells is in doubt
+        together = "\n".join(cells)
+        if separator == "," and parted is None and _ANY_PARTED.search(together):
+            row = next(k for k, cell in enumerate(cells) if _PARTED.fullmatch(cell))
+            parted = (name, lines[row], cells[row])
+        for row, cell in enumerate(cells if "," in together else ()):
             if _COMMA.fullmatch(cell):
                 comma = comma or (name, lines[row], cell)
                 decimal = decimal or not THOUSANDS.fullmatch(cell)
-        _refuse_points_of_thousands(path, name, text, lines)
-        if point is None:
-            points = text.str.fullmatch(_POINT).to_numpy(bool)
-            point = text.iloc[int(points.argmax())] if points.any() else None
+        if _ANY_WHOLE.search(together):
+            _refuse_points_of_thousands(path, name, cells, lines)
+        if point is None and "." in together:
+            point = next(filter(_POINT.fullmatch, cells), None)
     if parted is not None and point is None:
         name, line, cell = parted
         problem = f"expected commas between columns, {cell!r} stands behind a decimal one"
@@ -161,22 +182,18 @@ def require_one_notation(
 
 
 def _refuse_points_of_thousands(
-    path: Path, name: str, text: pd.Series, lines: Sequence[int]
+    path: Path, name: str, cells: Sequence[str], lines: Sequence[int]
 ) -> None:
     """Refuse 1.234 beside 950: no number has another count of decimals, none is below 1."""
-    if sum(len(cell) in (3, 4) for cell in text.to_numpy()) < 2:
+    whole = [cell for cell in cells if _WHOLE.fullmatch(cell)]
+    if len(whole) < 2:
         return
-    dotted = text.str.fullmatch(r"[-+]?[1-9]\d{0,2}\.\d{3}").to_numpy(bool)
-    whole = text.str.fullmatch(r"[-+]?[1-9]\d{2}").to_numpy(bool)
-    if min(dotted.sum(), whole.sum()) < 2 or not (
-        (dotted | whole).sum() > 0.9 * (text.str.len() > 0).sum()
-    ):
+    dotted = [row for row, cell in enumerate(cells) if _DOTTED.fullmatch(cell)]
+    said = sum(map(bool, cells))
+    if len(dotted) < 2 or not len(dotted) + len(whole) > 0.9 * said:
         return
-    row = int(dotted.argmax())
-    problem = (
-        f"expected decimals or thousands, got {text.iloc[row]!r} beside "
-        f"{text.iloc[int(whole.argmax())]!r}"
-    )
+    row = dotted[0]
+    problem = f"expected decimals or thousands, got {cells[row]!r} beside {whole[0]!r}"
     cure = "Write nothing between thousands, and decimals in every number or in none."
     raise DataFileError(path, problem, cure, line=lines[row], column=name)
 

@@ -90,7 +90,8 @@ def read_columns(path: Path, table: RawTable, declared: Declared) -> Columns:
         if meaning.name == IGNORE:
             continue
         numbers = table.numbers(path, k)
-        _say_gaps(path, table, k)
+        if numbers.hasnans:
+            _say_gaps(path, table, k)
         key = meaning.name + (STDERR if meaning.stderr else "")
         if (key, meaning.wavelength) in first:
             _require_same(path, table, first[key, meaning.wavelength], k, key)

@@ -1,6 +1,7 @@
 """Tables with names of columns: the project's own CSV, and those of others."""
 
 from collections.abc import Iterable, Mapping
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from data_io.goniometer.tables.quantities import mueller_elements
 from data_io.goniometer.tables.table import read_table
 from data_io.goniometer.tables.unit_words import require_whole_of_per_cent
 from data_io.goniometer.tables.writing import NOTES
-from data_io.text.text import Line, without_comments
+from data_io.text.text import Line, content_of
 from pbrdf.errors import DataFileError
 
 # sin(theta_s) |sin(dphi)| of a reading that counts as in plane
@@ -38,11 +39,11 @@ TAKES = ("columns", "azimuth_of_forward", "angles", "normalised")
 
 def looks_like(lines: list[Line]) -> bool:
     """Tell whether a line names a column that is known, or has separators."""
-    content = without_comments(lines)
+    content = list(islice(content_of(lines), 30))
     # Each word once: a line may hold a million cells that are alike
     words = {
         cell.strip().strip('"')
-        for line in content[:30]
+        for line in content
         for mark in (",", ";", "\t", "|", None)
         for cell in line.text.split(mark)
     }

@@ -14,6 +14,7 @@ from data_io.goniometer.tables.cells import (
     cells_of,
     is_plain,
     numbers_of,
+    plain_row,
     require_one_notation,
     separator_of,
     sign_behind,
@@ -187,9 +188,16 @@ def _rows(
 ) -> tuple[list[tuple[Line, list[str]]], list[Line]]:
     """Return the cells of each row, and the lines of words among them."""
     width = len(heads[0])
+    plain = plain_row(separator, width)
     rows: list[tuple[Line, list[str]]] = []
     words: list[Line] = []
     for line in content:
+        if plain.fullmatch(line.text):
+            row = line.text.split(separator)
+            rows.append(
+                (line, [cell.strip(" ") for cell in row] if " " in line.text else row)
+            )
+            continue
         if line.text.lstrip().startswith(_COMMENT) or (
             separator != ";" and line.text.lstrip().startswith(";")
         ):
