@@ -33,7 +33,8 @@ class Running:
         self.count += 1
         step = values - self.mean
         self.mean += step / self.count
-        self._scatter += step * (values - self.mean)
+        step *= values - self.mean
+        self._scatter += step
 
     def variance(self) -> np.ndarray:
         """Return the variance of the mean."""

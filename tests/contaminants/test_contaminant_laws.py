@@ -80,10 +80,11 @@ def test_b16_b17_the_budget_closes_with_absorbers_and_dust():
 
 
 @pytest.mark.slow
-def test_b16_ten_million_rays_never_lose_count_of_the_media():
-    rays = {"n_rays": 320_000, "realizations": 16, "stokes": "unpolarized"}
+def test_b16_three_million_rays_never_lose_count_of_the_media():
+    """One wrong in a million would be seen with a chance of 95 %."""
+    rays = {"n_rays": 200_000, "realizations": 8, "stokes": "unpolarized"}
     result = run(PAINT, crowd(), **rays)
-    assert sum(result.attrs["rays_escaped"]) > 1e7
+    assert sum(result.attrs["rays_escaped"]) > 3e6
     clean_counters(result)
 
 

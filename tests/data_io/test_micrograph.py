@@ -288,7 +288,7 @@ def test_parts_of_other_pictures_are_refused(tmp_path, name):
     """Crops hold fewer things, so more of them look like two phases with an edge."""
     picture, rng = getattr(data, name)(), np.random.default_rng(0)
     taken = 0
-    for _ in range(25):
+    for _ in range(15):
         rows, columns = rng.integers(120, min(*picture.shape[:2], 400), 2)
         top = rng.integers(0, picture.shape[0] - rows)
         left = rng.integers(0, picture.shape[1] - columns)
