@@ -21,6 +21,8 @@ PRESSURE = 1013.25
 MOST_DEPTH = 10.0
 # Errors above this part of I are warned of
 MOST_ERROR = 1e-3
+# So are air masses of plane air that are too large by this part
+MOST_BENT = 0.05
 
 
 def rayleigh_optical_depth(
@@ -60,6 +62,24 @@ def rayleigh_optical_depth(
     return np.asarray(pressure / PRESSURE * at_sea)
 
 
+def _tell_low(sun: Sun) -> None:
+    """Warn of a sun that shines through another air mass than that of plane air.
+
+    The air mass of the round Earth after F. Kasten and A. T. Young, Appl. Opt. 28, 4735
+    (1989).
+    """
+    zenith = float(np.rad2deg(sun.theta))
+    plane = 1.0 / max(cos(sun.theta), 1e-12)
+    curved = 1.0 / (cos(sun.theta) + 0.50572 * (96.07995 - zenith) ** -1.6364)
+    if plane > (1.0 + MOST_BENT) * curved:
+        msg = (
+            f"sun is {90.0 - zenith:.3g} degrees high, where plane air has an air mass of "
+            f"{plane:.3g} and that of the Earth {curved:.3g}: sun and sky are wrong by as "
+            "much in their optical depth. Take a higher sun, or a sky table."
+        )
+        warnings.warn(msg, AccuracyWarning, stacklevel=4)
+
+
 @dataclass(frozen=True, kw_only=True)
 class _CleanAir:
     """Plane-parallel air that scatters and does not absorb."""
@@ -85,13 +105,15 @@ class _CleanAir:
                 )
                 raise ValueError(msg)
             rayleigh_optical_depth(0.5, self.pressure)
+        _tell_low(self.sun)
 
     @property
     def relative(self) -> bool:
         """Whether radiances are relative to the sun's irradiance."""
         return self.sun.relative
 
-    def _depth(self, wavelength: float | None) -> float:
+    def depth(self, wavelength: float | None) -> float:
+        """Optical depth of the air along the vertical. [1]"""
         if self.optical_depth is not None:
             return spectral("optical_depth", self.optical_depth, wavelength)
         pressure = PRESSURE if self.pressure is None else self.pressure
@@ -156,7 +178,7 @@ class RayleighSky(_CleanAir):
         >>> round(float(q / i), 6), round(float(u / i), 6) + 0.0
         (1.0, 0.0)
         """
-        depth = self._depth(wavelength)
+        depth = self.depth(wavelength)
         to_sky, to_sun = direction(theta, phi), direction(self.sun.theta, self.sun.phi)
         cos_scatter = to_sky @ to_sun
         light = self.sun.above(wavelength) / (4 * pi) * once(
@@ -197,7 +219,8 @@ class ClearSky(_CleanAir):
     Warns
     -----
     AccuracyWarning
-        If the sky is less exact than 0.1 % of I, as under a sun at the horizon.
+        If the sky is less exact than 0.1 % of I, as under a sun at the horizon; if the sun
+        is so low that the round Earth has an air mass 5 % below that of plane air.
 
     References
     ----------
@@ -258,7 +281,7 @@ class ClearSky(_CleanAir):
         return self._air(wavelength).error
 
     def _air(self, wavelength: float | None) -> Air:
-        depth = self._depth(wavelength)
+        depth = self.depth(wavelength)
         one_number(
             "optical_depth", depth, lambda v: v <= MOST_DEPTH, f"be <= {MOST_DEPTH:g} [1]",
             "Clean air has less; take OvercastSky for clouds.",

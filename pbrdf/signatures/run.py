@@ -14,7 +14,12 @@ from pbrdf._version import __version__
 from pbrdf.conventions import STOKES
 from pbrdf.errors import AccuracyWarning, require
 from pbrdf.signatures.function_surface import BLACK, FunctionSurface
-from pbrdf.signatures.planck import black_body, checked_temperature, tell_cold
+from pbrdf.signatures.planck import (
+    black_body,
+    checked_temperature,
+    spectral,
+    tell_cold,
+)
 from pbrdf.signatures.result_surface import ResultSurface, SunlitResult
 from pbrdf.signatures.results import Result
 from pbrdf.signatures.skies import Sky
@@ -24,6 +29,8 @@ __all__ = ["signature"]
 
 # From the far ultraviolet to the far infrared; beyond, another unit was meant [um]
 SHORTEST, LONGEST = 0.1, 100.0
+# Part of the direct light that may be in the sky too
+MOST_TWICE = 0.01
 ABSOLUTE, RELATIVE = "W m-2 sr-1 um-1", "sr-1"
 LONG_NAMES = {
     "radiance": "Stokes radiance at the sensor",
@@ -94,7 +101,8 @@ def signature(  # noqa: PLR0913  (the public signature)
     -----
     AccuracyWarning
         If a result has lost light, which would count as emitted, or was traced at another
-        azimuth; if the surface is colder than 100 K; if a wavelength lies beyond 0.1 to
+        azimuth; if the surface is colder than 100 K; if the sun is dimmed less than its
+        clear sky scatters away; if a wavelength lies beyond 0.1 to
         100 um, as one in nanometres does.
 
     Examples
@@ -130,6 +138,8 @@ def signature(  # noqa: PLR0913  (the public signature)
         else:
             surface = result.surface(wave, float(theta), float(phi), sun_only)
         seen.append(_look(surface, wave, sun, skies, temperature))
+    if sun is not None:
+        _tell_dimming(sun, skies, each)
     relative = (sun is not None and sun.relative) or any(map(_relative, skies))
     axes = {"wavelength": waves, "theta_s": views, "phi_s": azimuths}
     dataset = _dataset(seen, axes, RELATIVE if relative else ABSOLUTE)
@@ -225,6 +235,24 @@ def _tell_unit(waves: np.ndarray) -> None:
         f"Wavelengths are micrometres: {cure}."
     )
     warnings.warn(msg, AccuracyWarning, stacklevel=4)
+
+
+def _tell_dimming(sun: Sun, skies: list[Any], waves: Sequence[float | None]) -> None:
+    """Warn of direct sunlight that a clear sky has scattered already."""
+    worst, told = MOST_TWICE, ""
+    for wave in waves:
+        depth = sum(one.depth(wave) for one in skies if hasattr(one, "depth"))
+        passed = spectral("optical_depth", sun.optical_depth, wave)
+        twice = -np.expm1(-max(depth - passed, 0.0) / np.cos(sun.theta))
+        if twice > worst:
+            worst = twice
+            told = (
+                f"direct sunlight is dimmed by an optical depth of {passed:.3g}, and its "
+                f"sky scatters that of {depth:.3g}: {100 * twice:.2g} % of the direct "
+                f"light are counted twice. Give Sun(optical_depth={depth:.3g})."
+            )
+    if told:
+        warnings.warn(told, AccuracyWarning, stacklevel=3)
 
 
 def _check_light(sun: Any, skies: list[Any], temperature: Any) -> None:

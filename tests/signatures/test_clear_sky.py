@@ -290,8 +290,29 @@ def test_what_is_no_clear_sky_is_refused_or_told() -> None:
     ):
         ClearSky(sun=sun, optical_depth=0.3, ground_albedo=3.0)
     assert ClearSky(sun=sun, optical_depth=0.5).error() < 1e-6
+    with pytest.warns(AccuracyWarning, match="has an air mass of 57.3 and that of the E"):
+        low = ClearSky(sun=Sun(theta=np.deg2rad(89)), optical_depth=8.0)
     with pytest.warns(AccuracyWarning, match="under a sun 1 degrees high through"):
-        ClearSky(sun=Sun(theta=np.deg2rad(89)), optical_depth=8.0).stokes(0.5, 1.0, None)
+        low.stokes(0.5, 1.0, None)
+    # Kasten and Young: 5.60 at 80 degrees, where plane air has 5.76
+    ClearSky(sun=Sun(theta=np.deg2rad(80)), optical_depth=0.1)
+    with pytest.warns(AccuracyWarning, match=r"mass of 11\.5 and that of the Earth 10\.3"):
+        RayleighSky(sun=Sun(theta=np.deg2rad(85)), optical_depth=0.1)
+
+
+def test_light_that_is_counted_twice_is_told() -> None:
+    white = pbrdf.MicrofacetModel(
+        pbrdf.Material(1.5), 0.2, specular_gain=0.0, diffuse_albedo=0.3
+    )
+    bare = Sun(theta=0.7)
+    with pytest.warns(AccuracyWarning, match=r"depth of 0, .* of 0\.2: 23 % of the direct"):
+        pbrdf.signature(white, 0.4, sun=bare, sky=ClearSky(sun=bare, optical_depth=0.2))
+    half = Sun(theta=0.7, optical_depth=([0.4, 0.6], [0.4, 0.1]))
+    with pytest.warns(AccuracyWarning, match=r"Give Sun\(optical_depth=0\.3\)"):
+        pbrdf.signature(
+            white, 0.4, wavelength=[0.4, 0.6], sun=half,
+            sky=RayleighSky(sun=half, optical_depth=0.3),
+        )  # fmt: skip
 
 
 def test_a_plate_under_sun_and_sky_over_ground_like_it() -> None:

@@ -180,7 +180,7 @@ def test_a_mirrored_sun_flips_u_and_v() -> None:
         pbrdf.signature(
             PAINT,
             0.7,
-            sun=(sun := Sun(theta=0.8, phi=azimuth)),
+            sun=(sun := Sun(theta=0.8, phi=azimuth, optical_depth=0.2)),
             sky=RayleighSky(sun=sun, optical_depth=0.2),
             rel_error=1e-5,
         )

@@ -163,7 +163,8 @@ def test_the_beam_of_waves_is_part_of_what_is_seen(polished) -> None:
     sun = Sun(theta=0.9, phi=2.0, irradiance=900.0)
     # The sky of another sun, whose light is not polarised along the plane of the view
     sky = RayleighSky(sun=replace(sun, theta=0.4, phi=0.8))
-    light = {"sun": sun, "sky": sky, "temperature": 3000.0, "wavelength": 0.6}
+    behind = replace(sun, optical_depth=sky.depth(0.6))
+    light = {"sun": behind, "sky": sky, "temperature": 3000.0, "wavelength": 0.6}
     at = {"theta_s": 0.9, "phi_s": 2.0 - pi + 0.001}
     traced, closed = (pbrdf.signature(one, **at, **light) for one in (polished, model))
     # The beam is the same; what is scattered differs by bins

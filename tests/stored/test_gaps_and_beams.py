@@ -82,7 +82,7 @@ def test_the_beam_of_waves_is_that_of_computed_points(tmp_path: Path) -> None:
     assert_allclose(found.coherent, direct.coherent.transpose(*order), rtol=1e-9)
     one = source.coherent(np.round(incidences[1], 7), 3.0, n=1.7)
     assert_allclose(one, found.coherent[1, 1], rtol=1e-12)
-    sun = Sun(theta=0.6)
+    sun = Sun(theta=0.6, optical_depth=0.1)
     seen, wanted = (
         pbrdf.signature(held, incidences[1], wavelength=3.0, sun=sun, temperature=None,
                         sky=RayleighSky(sun=sun, optical_depth=0.1))
