@@ -168,7 +168,7 @@ def _look(
     total, error = np.zeros(4), np.zeros(4)
 
     def light(theta: np.ndarray, phi: np.ndarray) -> np.ndarray:
-        return np.asarray(sum(one.stokes(theta, phi, wave) for one in skies))
+        return np.asarray(sum(_lit(one, theta, phi, wave) for one in skies))
 
     if sun is not None:
         part, spread = surface.facing(sun, sun.at_ground(wave))
@@ -191,6 +191,22 @@ def _look(
             _, spread = surface.gather(lambda t, p: light(t, p) - own * BLACK)
             error = spread + found.get("reflected_sun_stderr", np.zeros(4))
     return {"radiance": total, "radiance_stderr": error, **found}
+
+
+def _lit(sky: Sky, theta: np.ndarray, phi: np.ndarray, wave: float | None) -> np.ndarray:
+    """Return the light of a sky; refuse one that has gaps."""
+    found = np.asarray(sky.stokes(theta, phi, wave))
+    gaps = ~np.isfinite(found).all(-1)
+    if gaps.any():
+        at = (np.broadcast_to(np.rad2deg(one), gaps.shape)[gaps][0] for one in (theta, phi))
+        zenith, azimuth = at
+        msg = (
+            f"sky must be finite, {int(gaps.sum())} of {gaps.size} directions of "
+            f"{type(sky).__name__} are not, the first at theta {zenith:.4g}, phi "
+            f"{np.mod(azimuth, 360.0):.4g} degrees. Mend it there."
+        )
+        raise ValueError(msg)
+    return found
 
 
 def _axes(

@@ -56,6 +56,17 @@ def test_a_function_with_gaps_is_refused_with_their_place() -> None:
     assert pbrdf.signature(Torn(), 0.4, sun=Sun(theta=0.4)).radiance[0] > 0
 
 
+def test_a_sky_with_gaps_is_refused_with_their_place(result) -> None:
+    class Torn:
+        def stokes(self, theta, phi, wavelength):
+            light = OvercastSky(radiance=1.0).stokes(theta, phi, wavelength)
+            return np.where((np.asarray(theta) > 1.3)[..., None], np.nan, light)
+
+    for source in (PAINT, result):
+        with pytest.raises(ValueError, match=r"directions of Torn .* at theta (7[5-9]|8)"):
+            pbrdf.signature(source, 0.3, sky=Torn())
+
+
 @pytest.mark.parametrize(
     ("wavelength", "words"),
     [
