@@ -27,6 +27,23 @@ def shortened(text: str, most: int) -> str:
     return f"{text[: most - 5 - tail]} ... {text[-tail:]}"
 
 
+def visible(text: str) -> str:
+    r"""Return a text on one line, with signs that steer a terminal written out.
+
+    Examples
+    --------
+    >>> visible("a\nb \x1b[31mred \u202ecsv µm")
+    'a b \\x1b[31mred \\u202ecsv µm'
+    """
+    text = " ".join(text.split())
+    if text.isprintable():
+        return text
+    return "".join(
+        sign if sign.isprintable() else sign.encode("unicode_escape").decode()
+        for sign in text
+    )
+
+
 def percent(share: float) -> str:
     """Return a share in per cent with two digits.
 
@@ -95,14 +112,14 @@ class DataFileError(ValueError):
         line: int | None = None,
         column: str | None = None,
     ) -> None:
-        place = shortened(Path(path).name, 80)
+        place = shortened(visible(Path(path).name), 80)
         if line is not None:
             place += f" line {line}"
         if column is not None:
-            place += f", column {shortened(column, 60)}"
+            place += f", column {shortened(visible(column), 60)}"
         room = MOST_SIGNS - len(place) - len(": . ")
-        problem = shortened(" ".join(problem.split()), max(room - len(cure), room // 2))
-        cure = shortened(" ".join(cure.split()), room - len(problem))
+        problem = shortened(visible(problem), max(room - len(cure), room // 2))
+        cure = shortened(visible(cure), room - len(problem))
         super().__init__(f"{place}: {problem}. {cure}")
         self.path = Path(path)
         self.line = line

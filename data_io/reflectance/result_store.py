@@ -143,7 +143,8 @@ def read_store(path: str | Path) -> xr.Dataset:
             stored = xr.open_zarr(path, chunks=None, consolidated=False, decode_times=False)
             checksums = json.loads(stored.attrs.pop(CHECKSUMS))
             names = {name: list(held) for name, held in checksums.items()}
-            group = int(names.pop(_GROUP, ["0"])[0])
+            group = max(int(names.pop(_GROUP, ["0"])[0]), 0)
+            expected = names.pop(OF_ATTRS, [digest_of_attrs(stored.attrs)])[0]
     except FAULTS as error:
         problem = f"cannot be read: {first_line(error)}"
         place = _unreadable(path)
@@ -151,9 +152,7 @@ def read_store(path: str | Path) -> xr.Dataset:
     if stored.nbytes > _SMALL and stored.nbytes > SHARE * free_bytes():
         problem = f"it takes {told(stored.nbytes)}, more than the memory that is free"
         raise DataFileError(path, problem, "Read parts of it by xarray.open_zarr.")
-    if names.pop(OF_ATTRS, [digest_of_attrs(stored.attrs)])[0] != digest_of_attrs(
-        stored.attrs
-    ):
+    if expected != digest_of_attrs(stored.attrs):
         problem = "they are not those that were written: their checksum differs"
         raise DataFileError(path, problem, DAMAGED, column="attributes")
     for name in sorted(names.keys() | set(map(str, stored.variables))):

@@ -23,6 +23,7 @@ from pbrdf.cli import measuring, predicting, showing
 from pbrdf.cli.progress import Talk, talk
 from pbrdf.cli.typed import remember
 from pbrdf.cli.wording import in_options, options_of
+from pbrdf.errors import visible
 from pbrdf.files.writing import FULL
 
 __all__ = ["app", "main"]
@@ -170,7 +171,7 @@ def _kept(error: BaseException) -> str:
 def _fail(error: Exception, message: str, code: int = BAD_INPUT) -> int:
     if os.environ.get("PBRDF_TRACEBACK") or talk() is Talk.VERBOSE:
         raise error
-    typer.echo(f"error: {message}", err=True)
+    typer.echo(f"error: {visible(message)}", err=True)
     return code
 
 
@@ -195,7 +196,7 @@ def _sentence(error: Exception) -> str:
         text = error.format_message()
     else:
         text = str(error) or type(error).__name__
-    text = " ".join(text.split())
+    text = visible(text)
     return text if text.endswith((".", "!", "?")) else f"{text}."
 
 
@@ -215,5 +216,5 @@ def _one_line_warning(
     arguments: Sequence[str], message: Warning | str, *_: object, **__: object
 ) -> None:
     if talk() is not Talk.QUIET:
-        text = _in_words_of_the_command(" ".join(str(message).split()), arguments)
+        text = _in_words_of_the_command(visible(str(message)), arguments)
         typer.echo(f"warning: {text}", err=True)

@@ -137,6 +137,7 @@ def _check_group(
     path: str | Path, group: h5py.Group, size: int, depth: int = 0, count: int = 0
 ) -> int:
     """Check what a group holds; return how many entries have been met so far."""
+    _check_attributes(path, group)
     for name in group:
         count += 1
         # Groups may hold others by many ways
@@ -157,8 +158,15 @@ def _check_group(
     return count
 
 
+def _check_attributes(path: str | Path, item: h5py.Group | h5py.Dataset) -> None:
+    if len(item.attrs) > MOST_ENTRIES:
+        problem = f"{item.name[:80]} has more than {MOST_ENTRIES} attributes"
+        raise DataFileError(path, problem, HOSTILE)
+
+
 def _check_dataset(path: str | Path, name: str, item: h5py.Dataset, size: int) -> None:
     place = f"variable {name[:80]}"
+    _check_attributes(path, item)
     if item.id.get_create_plist().get_external_count():
         problem = "its data lie in another file"
         raise DataFileError(path, problem, HOSTILE, column=place)

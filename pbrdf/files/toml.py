@@ -13,12 +13,15 @@ __all__ = ["read_toml", "tables_of"]
 MOST_BYTES = MOST_TEXT = 64 * 2**20
 # The parser takes a time that grows with the square of their number
 MOST_DOTS = 500
+# Some 4 us each
+MOST_VALUES = 1_000_000
 
 
 def tables_of(text: str) -> dict[str, Any]:
     """Parse a text that another file holds; return no tables if it is no TOML."""
     try:
-        return tomllib.loads(text[:MOST_TEXT]) if _dots(text) <= MOST_DOTS else {}
+        few = _dots(text) <= MOST_DOTS and _values(text) <= MOST_VALUES
+        return tomllib.loads(text[:MOST_TEXT]) if few else {}
     except (ValueError, OverflowError, RecursionError):
         return {}
 
@@ -30,6 +33,11 @@ def _dots(text: str) -> int:
     )
 
 
+def _values(text: str) -> int:
+    """Count what a text may hold at most: keys, members of lists, escaped signs."""
+    return sum(map(text.count, "=,[\\"))
+
+
 def read_toml(source: str | Path) -> dict[str, Any]:
     """Parse a TOML file, or raise a DataFileError that says what is wrong with it."""
     try:
@@ -38,6 +46,10 @@ def read_toml(source: str | Path) -> dict[str, Any]:
         if dots > MOST_DOTS:
             problem = f"has {dots} dots in its keys, more than any file of this program"
             raise DataFileError(source, problem, "Write [tables] instead of dotted keys.")
+        values = _values(text)
+        if values > MOST_VALUES:
+            problem = f"may hold {values} values, more than {MOST_VALUES}"
+            raise DataFileError(source, problem, "Keep heights in a .npy file.")
         return tomllib.loads(text)
     except DataFileError:
         raise

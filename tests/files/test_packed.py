@@ -138,6 +138,10 @@ def deep(path):
         (lambda path: about(path, shape=[10**400]), "variable brdf: its shape"),
         (lambda path: about(path, chunk_grid=[]), "variable brdf: its shape"),
         (
+            lambda path: about(path, codecs=[{"name": "bytes"}, *9 * [{"name": "crc32c"}]]),
+            "variable brdf: it is packed by bytes, crc32c",
+        ),
+        (
             lambda path: about(path, attributes={"_FillValue": "AAAA"}),
             "cannot be read: unpack",
         ),
@@ -158,6 +162,34 @@ def test_a_store_of_too_many_pieces(tmp_path):
     grid = {"name": "regular", "configuration": {"chunk_shape": [1, 1, 1, 1, 1, 1]}}
     about(path, shape=shape, chunk_grid=grid)
     refused(path, r"its 1.152e\+07 values are in pieces of 1")
+
+
+@pytest.mark.parametrize("sums", [{".": []}, {"./wavelength": []}, {"brdf": 3}, [1]])
+def test_a_store_whose_checksums_are_none(tmp_path, sums):
+    path = tmp_path / "r.zarr"
+    write_result(result(), path)
+    root = json.loads((path / "zarr.json").read_text())
+    root["attributes"]["pbrdf_checksums"] = json.dumps(sums)
+    (path / "zarr.json").write_text(json.dumps(root))
+    refused(path, "r.zarr: cannot be read")
+
+
+def test_a_file_of_thousands_of_attributes(tmp_path):
+    path = tmp_path / "r.nc"
+    write_result(result(), path)
+    with h5py.File(path, "r+") as file:
+        for number in range(1001):
+            file["brdf"].attrs[f"a{number}"] = 1
+    refused(path, "/brdf has more than 1000 attributes")
+
+
+def test_names_that_steer_a_terminal_are_written_out(tmp_path):
+    path = tmp_path / "a\n\x1b[31mb\u202e.nc"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("c\n\x1b[2Jd", (9,), "f8", chunks=(3,))
+    refused(
+        path, r"^a \\x1b\[31mb\\u202e.nc, column variable c \\x1b\[2Jd: it holds 0 of 3"
+    )
 
 
 def test_a_store_of_endless_depth(tmp_path):

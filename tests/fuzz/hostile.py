@@ -198,6 +198,7 @@ KINDS: dict[str, Write] = {
     "dots.toml": content("a" + 100_000 * ".a" + " = 1"),
     "keys.toml": content("".join(f"a.b{k}.c = 1\n" for k in range(100_000))),
     "deep.toml": content("a = " + 50_000 * "["),
+    "lists.toml": content(lambda: "a = [" + 2_000_000 * "[]," + "]"),
     "line.toml": content('a = "' + 1_000_000 * "x" + '"'),
     "integer.toml": content("[surface]\nspacing_um = " + 5000 * "9"),
     "nan.toml": content(ROUGH.format(shape=[64, 64], length="nan", slope=0.2, n=1.5)),

@@ -7,6 +7,7 @@ names without their namespace.
 
 import hashlib
 import lzma
+import warnings
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -68,8 +69,10 @@ class _Document:
     def __init__(self, path: Path, content: bytes) -> None:
         self.path = path
         try:
-            _refuse_entities(content)
-            self.root = ElementTree.fromstring(content)
+            # Codecs of Python, of which a file may name any, warn
+            with warnings.catch_warnings(action="ignore"):
+                _refuse_entities(content)
+                self.root = ElementTree.fromstring(content)
         except (ElementTree.ParseError, ExpatError, LookupError, ValueError) as error:
             problem = f"expected well-formed XML in main.xml, got: {str(error)[:150]}"
             raise DataFileError(path, problem, "Export the file again.") from error

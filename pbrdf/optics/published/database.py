@@ -20,7 +20,10 @@ _TABLES = {
 }
 # Far beyond any entry: characters, levels and parts
 _LARGEST, _DEEPEST, _MOST_PARTS = 8_000_000, 20, 100_000
+# Signs of a word; 1:1:1... is a number to base 60, read in a time that grows by the square
+_LONGEST = 1000
 _FORMULA = re.compile(r"formula\s+(\d+)")
+_SPACE = re.compile(r"\s")
 _TAG = re.compile(r"<[^<>]*>")
 
 
@@ -75,7 +78,7 @@ def _parse(path: Path, text: str) -> dict[str, Any]:
 
 
 def _check_events(path: Path, events: Iterable[Any]) -> None:
-    """Refuse what can grow without end when it is built: references, and deep nesting."""
+    """Refuse what can take for ever to build: references, depth, tags, endless words."""
     import yaml
 
     depth = count = 0
@@ -87,6 +90,10 @@ def _check_events(path: Path, events: Iterable[Any]) -> None:
             problem = "refers to another part of itself (an alias), as no entry does"
         elif depth > _DEEPEST or count > _MOST_PARTS:
             problem = "nests too deeply" if depth > _DEEPEST else "has too many parts"
+        elif getattr(event, "tag", None):
+            problem = f"has a tag, {event.tag[:60]}, as no entry does"
+        elif len(getattr(event, "value", "")) > _LONGEST and not _SPACE.search(event.value):
+            problem = f"has a word of {len(event.value)} signs"
         else:
             continue
         raise DataFileError(path, problem, "Download the entry again.")
