@@ -325,8 +325,10 @@ class WaveModel:
             Scattering(heights, name, 2).matrices(columns)[:, 0] for name in self._compared
         )
         slope = self.surface.slopes(columns[3])
+        fine = self.surface.fineness(columns[3])
         zenith = np.maximum(columns[0], columns[1])
-        return relative_error(found, best, orders, plane, slope, zenith).reshape(shape)
+        error = relative_error(found, best, orders, plane, slope, fine, zenith)
+        return error.reshape(shape)
 
     def profile_error(
         self, theta_i: npt.ArrayLike, theta_view: npt.ArrayLike, wavelength: npt.ArrayLike
@@ -337,9 +339,12 @@ class WaveModel:
             for name in self._compared
         )
         waves = np.broadcast_to(checked_wavelength(wavelength), found.shape[:-1])
-        slope = self.profile.slopes(waves.ravel()).reshape(*waves.shape, 1)
+        slope, fine = (
+            measure(waves.ravel()).reshape(*waves.shape, 1)
+            for measure in (self.profile.slopes, self.profile.fineness)
+        )
         zenith = np.maximum(*np.broadcast_arrays(theta_i, np.abs(theta_view), waves)[:2])
-        return relative_error(found, best, orders, plane, slope, zenith[..., None])
+        return relative_error(found, best, orders, plane, slope, fine, zenith[..., None])
 
     @property
     def _compared(self) -> tuple[str, str, str, str]:

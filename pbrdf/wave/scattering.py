@@ -15,6 +15,7 @@ from pbrdf.kernels.wave.scatter import (
     Plan,
     fill_scattering,
 )
+from pbrdf.wave.accuracy import MOST, OF_FINE
 from pbrdf.wave.directional import Directional, smith
 from pbrdf.wave.methods import method_of
 from pbrdf.wave.order_table import OrderTable
@@ -30,6 +31,8 @@ Moments = Callable[[Array, Array, Array, Array], Array]
 CHUNK = 4096
 # Steeper surfaces send part of the light to a second bounce, which no form here has
 STEEPEST = 0.45
+# Fineness that makes an error of 1 dB
+FINEST = 0.1
 SLOPED = ("auto", "order-weighted", "local-curvature")
 
 
@@ -79,6 +82,7 @@ class Scattering:
         spreads = self._spreads(columns[3])
         self._check_facets(spreads, columns[3])
         self._warn_of_slopes(columns[3])
+        self._warn_of_fine(columns[3])
         dressing = self._dressings(columns) if dressed else np.zeros((2, size), complex)
         moments = self._moments(2 * np.pi / columns[3].min())
         hidden = self.method.shadowed
@@ -153,6 +157,14 @@ class Scattering:
         """Rms slope of the heights that a wave can resolve, of each wavelength. [1]"""
         return self._spreads(wavelength) * self.heights.height_rms
 
+    def fineness(self, wavelength: Array) -> Array:
+        """Wave number times variance times the mean wave vector of what is finer. [1]"""
+        fineness = np.empty(wavelength.size)
+        for rows in each_wavelength(wavelength):
+            k = 2 * np.pi / float(wavelength[rows[0]])
+            fineness[rows] = k * self.heights.fine(k, self.dimensions)
+        return fineness * self.heights.height_rms**2
+
     def _spreads(self, wavelength: Array) -> Array:
         """Rms wave vector per axis of the heights that a wave can resolve. [rad/um]"""
         spreads = np.empty(wavelength.size)
@@ -177,6 +189,20 @@ class Scattering:
             axes = np.array([0.0, 0.5 * np.pi])
             return float(self.heights.slopes(4 * np.pi / shortest, axes).max())
         return float(self.slopes(np.array([shortest]))[0])
+
+    def _warn_of_fine(self, wavelength: Array) -> None:
+        """Say that roughness finer than the wave is too high for the forms."""
+        if self.name not in SLOPED or isinstance(self.heights, Directional):
+            return
+        shortest = wavelength.min()
+        fine = float(self.fineness(np.array([shortest]))[0])
+        if fine > FINEST:
+            warnings.warn(
+                f"Roughness finer than the wavelength of {shortest:g} um is high: the "
+                f"error may be {min(OF_FINE * fine, MOST):.2g} dB or more (see "
+                "error_estimate).",
+                AccuracyWarning, stacklevel=4,
+            )  # fmt: skip
 
     def _warn_of_slopes(self, wavelength: Array) -> None:
         """Say that second bounces are missing where the surface is steep."""

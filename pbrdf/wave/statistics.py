@@ -17,6 +17,8 @@ Array = np.ndarray
 TAIL = 1e-10
 # Nodes of a panel of the quadratures below
 PANEL_NODES = 16
+# Wave vectors beyond a limit are followed to this multiple of it
+FINEST = 30.0
 
 
 class Statistics:
@@ -69,6 +71,16 @@ class Statistics:
         if dimensions == 1:
             return float(np.sqrt((density * wave_vector**2).sum() / np.pi))
         return float(np.sqrt((density * wave_vector**3).sum() / (4 * np.pi)))
+
+    def fine(self, limit: float, dimensions: int) -> float:
+        """Mean absolute wave vector per axis of the components beyond `limit` [rad/um].
+
+        They are followed to FINEST times the limit: over power laws of finer and finer
+        roughness the mean has no end, but grows with its logarithm.
+        """
+        wave_vector, weight = panels(limit * np.geomspace(1.0, FINEST, 25))
+        density = self.spectrum(wave_vector, dimensions) * weight / self.height_rms**2
+        return float((density * wave_vector**dimensions).sum() / np.pi**dimensions)
 
     @cached_property
     def farthest_lag(self) -> float:

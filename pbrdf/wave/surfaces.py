@@ -29,6 +29,10 @@ FORMS = {
 LAGS, WAVES = 600, 400
 # A function of the lag is transformed as far as it is larger than this
 SMALLEST_KNOWN = 1e-9
+# A function this large at the last lag never falls
+SMALLEST_LASTING = 1e-3
+# Panels of lags in a transform, some seconds
+MOST_PANELS = 30_000
 # Where a correlation has been this small for so many lags, there is nothing more
 SMALLEST_CORRELATION, QUIET = 1e-4, 40
 # Difference of height_rms and the integral of a density that rounding and the finite range
@@ -70,12 +74,19 @@ class FromCorrelation(Statistics):
         steps = np.linspace(0.0, np.arcsinh(largest * length), WAVES)
         wave = np.sinh(steps) / length
         count = max(int(far * largest / (2 * np.pi)), 32)
+        if count > MOST_PANELS:
+            msg = (
+                f"autocorrelation must fall below {SMALLEST_KNOWN:g} within "
+                f"{far * MOST_PANELS / count:.4g} um, got {far:.4g} um: its spectrum would "
+                "take minutes. Give psd, or a table that ends."
+            )
+            raise ValueError(msg)
         lag, weight = panels(np.linspace(0.0, far, count), 12)
         rho = self.correlation(lag) * weight
-        if dimensions == 1:
-            values = 2.0 * np.cos(np.outer(wave, lag)) @ rho
-        else:
-            values = 2.0 * np.pi * special.j0(np.outer(wave, lag)) @ (rho * lag)
+        kernel = np.cos if dimensions == 1 else special.j0
+        along = 2.0 * rho if dimensions == 1 else 2.0 * np.pi * rho * lag
+        # One by one, as all together would take gigabytes
+        values = np.array([kernel(one * lag) @ along for one in wave])
         # Beyond the first place below rounding there is only noise
         noise = 1e-12 * np.abs(values).max()
         below = np.flatnonzero(np.abs(values) < noise)
@@ -247,8 +258,18 @@ def _from_correlation(rho: Any, height_rms: float, corr_length: float | None) ->
             raise ValueError(msg)
         start = corr_length if corr_length is not None else 1.0
         lags = start * np.geomspace(1e-3, 1e5, 4000)
-        above = np.flatnonzero(np.abs(rho(lags)) > SMALLEST_KNOWN)
+        known = require(
+            "autocorrelation", rho(lags), np.isfinite, "be finite",
+            f"It is asked at lags from {lags[0]:g} to {lags[-1]:g} um.",
+        )  # fmt: skip
+        above = np.flatnonzero(np.abs(known) > SMALLEST_KNOWN)
         farthest = float(lags[min(above[-1] + 1, lags.size - 1)])
+        if abs(known[-1]) > SMALLEST_LASTING:
+            msg = (
+                f"autocorrelation must fall to 0, got {known[-1]:.3g} at "
+                f"{farthest:.3g} um. Subtract what is no roughness: a plane, a wave."
+            )
+            raise ValueError(msg)
         length = one_over_e(rho, farthest)
         if corr_length is not None and abs(length / corr_length - 1.0) > 0.01:
             msg = (

@@ -190,3 +190,34 @@ def test_the_stated_error_covers_the_true_one() -> None:
     # Low rays err most: there it held 45 and 70 % before it knew of the slope
     assert within[low].mean() > 0.64
     assert twice[low].mean() > 0.9
+
+
+def waves_of(correlation):
+    """One matrix of heights with a correlation."""
+    model = WaveModel(Material(1.5), height_rms=0.05, autocorrelation=correlation)
+    return model.brdf(0.0, 0.1, 0.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (np.cos, "must fall to 0, got -0.999"),
+        (lambda x: 0.5 + 0.5 * np.exp(-x * x), "must fall to 0, got 0.5"),
+        (lambda x: 1 / (1 + x * x), "must fall below 1e-09 within"),
+        (lambda x: np.where(x > 5, np.nan, np.exp(-x)), "must be finite, got nan"),
+    ],
+)
+def test_autocorrelations_that_do_not_end_are_refused(given, said) -> None:
+    # Their transform took all memory
+    with pytest.raises(ValueError, match=said):
+        waves_of(given)
+
+
+def test_high_roughness_finer_than_the_wave_is_warned_of() -> None:
+    model = WaveModel(Material(1.5), height_rms=0.05, corr_length=0.05)
+    with pytest.warns(AccuracyWarning, match="finer than the wavelength of 0.5 um is high"):
+        model.brdf(0.1, 0.4, 2.0, 0.5)
+    # k h^2 times the mean wave vector of a Gaussian spectrum beyond k, in closed form
+    k = 2 * np.pi / 0.5
+    closed = k * 0.05**2 / 0.05 * 2 / np.sqrt(np.pi) * np.exp(-((k * 0.05) ** 2) / 4)
+    assert model.profile.fineness(np.array([0.5]))[0] == pytest.approx(closed, rel=1e-6)
