@@ -19,8 +19,10 @@ _MOST_LEVELS = 1000
 _RIM = 12
 # Steps between the terraces of crystals are lower; pictures smear none so narrow [um]
 _LATTICE = 0.002
-# Heights of blurred rims can be as many as to pass for levels
+# Heights of blurred rims can be as many as to pass for levels: of many, or of a few beside
+# even ones, nearly all of which are among them to this [1], [1], [steps]
 _COARSER = 0.8
+_SHARED, _AT_LEVEL = 0.9, 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +121,23 @@ def find_bands(heights: Array) -> Bands | None:
     comb = find_comb(heights)
     if comb is None or comb.size < FEWEST_LEVELS:
         return sharp
-    if sharp is not None and comb.size > _COARSER * sharp.levels.size:
+    if sharp is not None and not _passes_for_more(sharp.levels, comb):
         return sharp
     edges = _edges(comb)
     equal = equal_neighbours(np.where(np.isfinite(heights), _place(edges, heights), np.nan))
     return Bands(comb, edges, equal, smeared=True) if equal >= LEAST_EQUAL else None
+
+
+def _passes_for_more(sharp: Array, comb: Array) -> bool:
+    """Tell whether heights of blurred rims are among the levels that heights take exactly.
+
+    Blur, and rounding to the colours of a picture, split a level or put one between two.
+    """
+    if comb.size <= _COARSER * sharp.size:
+        return True
+    step = comb[1] - comb[0]
+    apart = np.abs(comb - sharp[_nearest(sharp, comb)])
+    return comb.size < sharp.size and bool(np.mean(apart < _AT_LEVEL * step) > _SHARED)
 
 
 def _sharp_bands(heights: Array, known: Array) -> Bands | None:

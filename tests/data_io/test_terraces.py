@@ -144,6 +144,15 @@ def test_pictures_smeared_after_digitisation(slope, length, bands, blur, noise, 
     assert_allclose(np.quantile(np.abs(slopes(mended)), SHARES), wanted, rtol=0.08)
 
 
+@pytest.mark.parametrize("seed", [2000, 2004, 2006, 2007])
+def test_rounded_blur_adds_no_levels(seed):
+    case = draw_case("blurred picture, 256 colours", seed)
+    true, raw = digitise(case, 384)
+    found = find_bands(raw)
+    assert found.levels.size == case.bands
+    assert_allclose(found.width, np.ptp(true) / case.bands, rtol=0.01)
+
+
 def test_terraces_of_a_crystal_are_named_and_left():
     # Steps of 0.4 nm across a tilted face, and the noise of the microscope [um]
     noise = 4e-5 * np.random.default_rng(2).standard_normal((120, 150))
