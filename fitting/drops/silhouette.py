@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from data_io.micrograph.levels import load_grey
-from fitting.drops.baseline import HIDDEN_OF_HEIGHT, HIDDEN_OF_WIDTH, with_hidden_foot
+from fitting.drops.baseline import most_hidden, with_hidden_foot
 from fitting.drops.contour import find_drops, narrowed
 from fitting.drops.on_line import DropContour
 from fitting.drops.refusal import NO_DROP_CURE, check_kink, check_shape, why_no_drop
@@ -111,7 +111,8 @@ def contact_angle(
 
     A silhouette does not show a foot that the front edge of its substrate hides. Unless a
     mirror image or a given baseline shows the contact, the interval (not the standard
-    error) holds a foot hidden by up to 6 % of the base with a chance of 10 %.
+    error) holds a foot hidden by up to 6 % of the drop's width, or a tenth of its height,
+    with a chance of 30 %.
 
     Parameters
     ----------
@@ -320,8 +321,7 @@ def _estimate(drop: DropContour, fit: ShapeFit, other: ShapeFit) -> Estimate:
         + (fit.slope_by_height * drop.offset_stderr) ** 2
         + drop.lean_stderr**2
     )
-    base = float(drop.points[-1, 0] - drop.points[0, 0])
-    depth = min(HIDDEN_OF_WIDTH * base, HIDDEN_OF_HEIGHT * float(drop.points[:, 1].max()))
+    depth = most_hidden(float(np.ptp(drop.points[:, 0])), float(drop.points[:, 1].max()))
     degrees = float(np.rad2deg(fit.angle + drop.bend))
     ends = np.rad2deg(
         with_hidden_foot(

@@ -82,6 +82,16 @@ def test_the_uncertainty_is_that_of_the_heights():
     assert np.std(drawn - deterrace(HeightMap(raw, 1.0), seed=3).surface.heights) > 0
 
 
+@pytest.mark.parametrize("seed", [2001, 2002])
+def test_the_uncertainty_is_that_of_bands_without_noise(seed):
+    true, raw = digitise(draw_case("plain", seed), 256)
+    smooth = deterrace(HeightMap(raw, 1.0), draw=False)
+    error = smooth.surface.heights - true
+    assert np.std(error) < 0.055 * smooth.bands.width
+    share = np.mean(np.abs(error) < 1.96 * smooth.uncertainty)
+    assert 0.92 < share < 0.985
+
+
 def test_heights_stay_near_their_bands_and_holes_are_free():
     true = random_surface(0.3, 12, 11)
     raw, width = digitised(true, 12, 0.0, 3)

@@ -164,14 +164,32 @@ def test_a_given_baseline_is_as_good_as_the_border_that_agrees_with_it():
     assert combine(line, far, (10, 90)).level == pytest.approx(6.0, abs=0.01)
 
 
-def test_the_interval_of_a_hidden_foot_is_that_of_its_draws():
+@pytest.mark.parametrize(("angle", "depth"), [(1.0, 12.0), (2.75, 20.0)])
+def test_the_interval_of_a_hidden_foot_is_that_of_its_draws(angle, depth):
+    # A circle whose centre lies above the baseline where the angle is obtuse [pixels]
+    radius, middle = 120.0, -120.0 * np.cos(angle)
     rng = np.random.default_rng(5)
-    draws = rng.normal(1.0, 0.02, 400_000)
-    draws += np.where(rng.random(draws.size) < 0.1, 0.01 * 12 * rng.random(draws.size), 0)
-    found = with_hidden_foot(1.0, 0.02, 0.01, 12.0, 0.1)
-    assert_allclose(found, np.quantile(draws, [0.025, 0.975]), atol=5e-4)
-    plain = with_hidden_foot(1.0, 0.02, 0.01, 12.0, 0.0)
-    assert_allclose(plain, [1 - 1.96 * 0.02, 1 + 1.96 * 0.02], atol=1e-5)
+    above = np.minimum(middle + depth * rng.random(400_000), radius)
+    feet = np.arctan2(np.sqrt(radius**2 - above**2), -above)
+    feet = np.where(rng.random(above.size) < 0.3, feet, angle)
+    draws = feet + rng.normal(0, 0.02, above.size)
+    rise = 1 / (radius * np.sin(angle))
+    found = with_hidden_foot(angle, 0.02, rise, depth, 0.3)
+    assert_allclose(found, np.quantile(draws, [0.025, 0.975]), atol=1e-3)
+    plain = with_hidden_foot(angle, 0.02, rise, depth, 0.0)
+    assert_allclose(plain, angle + 1.96 * 0.02 * np.array([-1, 1]), atol=1e-5)
+
+
+@pytest.mark.slow
+def test_feet_that_nobody_can_see_are_in_the_intervals():
+    inside = []
+    for seed in range(63100, 63112):
+        rng = np.random.default_rng([seed, KINDS.index("hidden foot")])
+        degrees = rng.uniform(10, 170)
+        image, _ = photograph("hidden foot", np.deg2rad(degrees), rng)
+        found = contact_angle(image)
+        inside += [side.low <= degrees <= side.high for side in (found.left, found.right)]
+    assert np.mean(inside) > 0.85
 
 
 @pytest.mark.parametrize("seed", [1, 2])
