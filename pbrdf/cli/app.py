@@ -21,7 +21,7 @@ import typer
 from pbrdf import __version__
 from pbrdf.cli import measuring, predicting, showing
 from pbrdf.cli.progress import Talk, talk
-from pbrdf.cli.typed import remember
+from pbrdf.cli.typed import remember, remembering_paths
 from pbrdf.cli.wording import in_options, options_of
 from pbrdf.errors import visible
 from pbrdf.files.writing import FULL
@@ -92,7 +92,7 @@ def _commands() -> Iterator[tuple[str, Callable[..., Any]]]:
 
 COMMANDS = dict(_commands())
 for name, function in COMMANDS.items():
-    app.command(name)(function)
+    app.command(name)(remembering_paths(function))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -8,6 +8,7 @@ from typing import Any
 
 import typer
 
+from pbrdf.cli.typed import check_apart
 from pbrdf.files import complete_file, complete_folder
 
 __all__ = [
@@ -35,6 +36,7 @@ def staged_folder(target: Path, *, force: bool = False) -> Iterator[Path]:
         If `target` exists and may not be replaced; before any work is done where it can be
         known by then.
     """
+    check_apart(target)
     _check_ours(target)
     with complete_folder(target, replace=force) as stage:
         yield stage
@@ -49,6 +51,7 @@ def staged_file(target: Path, *, force: bool = False) -> Iterator[Path]:
     ValueError
         If `target` is a folder, or exists and `force` is not given.
     """
+    check_apart(target)
     with complete_file(target, replace=force) as stage:
         yield stage
 
@@ -64,6 +67,7 @@ def staged_store(target: Path, *, force: bool = False) -> Iterator[Path]:
     """
     from data_io import is_result_store
 
+    check_apart(target)
     strange = target.is_dir() and any(target.iterdir()) and not is_result_store(target)
     if strange or (target.exists() and not target.is_dir()):
         msg = (

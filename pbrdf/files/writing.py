@@ -187,7 +187,7 @@ def _take_name(stage: Path, path: Path) -> None:
 
 
 def _prefix(path: Path) -> str:
-    return f".{path.stem[:80]}.part-{_host()}-{os.getpid()}-"
+    return f".{path.stem[:30]}.part-{_host()}-{os.getpid()}-"
 
 
 def _host() -> str:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from pbrdf.cli import main
 from pbrdf.cli.staging import MARK, staged_file, staged_folder
 
 
@@ -91,3 +92,38 @@ def test_the_parent_must_exist(tmp_path: Path) -> None:
         staged_folder(tmp_path / "a/b"),
     ):
         pass
+
+
+def test_an_input_is_never_replaced(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out").mkdir()
+    measured = "x_um,z_um\n" + "\n".join(f"{k},{(k * k) % 7}" for k in range(200))
+    for name in ("map.csv", "scan.csv", "out/map.csv", f"out/{MARK}"):
+        (tmp_path / name).write_text(measured)
+    (tmp_path / "link.csv").symlink_to("map.csv")
+    (tmp_path / "r.zarr").mkdir()
+    (tmp_path / "r.zarr/zarr.json").write_text("{}")
+    before = listing(tmp_path)
+    numbers = ["--n", "1.5", "--wavelength-um", "0.5", "--theta-i-deg", "30"]
+    for words, said in (
+        (["predict", "map.csv", *numbers, "-o", "./map.csv"], "what is read, map.csv"),
+        (["predict", "link.csv", *numbers, "-o", "map.csv"], "what is read, link.csv"),
+        (
+            ["pipeline", "out/map.csv", "scan.csv", "--n", "1.5", "-o", "out"],
+            "what is read",
+        ),
+        (["predict", "map.csv", *numbers, "-o", "r.zarr/a.csv"], "within a store"),
+    ):
+        assert main([*words, "--force"]) == 2
+        assert said in capsys.readouterr().err
+    assert listing(tmp_path) == before
+    assert (tmp_path / "map.csv").read_text() == measured
+
+
+def test_two_outputs_have_two_names(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    rows = "\n".join(f"{k},{(k * k) % 7}" for k in range(200))
+    (tmp_path / "profile.csv").write_text(f"x_um,z_um\n{rows}\n")
+    words = ["statistics", "profile.csv", "--figure", "a.png", "--slopes", "./a.png"]
+    assert main([*words, "--force"]) == 2
+    assert "a name of its own" in capsys.readouterr().err

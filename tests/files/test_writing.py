@@ -45,6 +45,13 @@ def write_text(path: Path, text: str) -> str:
     return text
 
 
+def test_the_longest_names_are_taken(tmp_path):
+    for name in ("x" * 252 + ".nc", "\u00b5" * 120 + ".nc", "\U0001f600" * 62 + ".nc"):
+        with complete_file(tmp_path / name) as stage:
+            stage.write_text(name)
+        assert (tmp_path / name).read_text() == name
+
+
 def test_of_many_writers_exactly_one_wins(tmp_path):
     for attempt in range(5):
         path = tmp_path / f"out{attempt}.txt"
