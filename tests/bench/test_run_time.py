@@ -144,7 +144,7 @@ def test_the_engine_has_not_become_slow():
     ("name", "floor"), [("smooth", 30), ("gentle", 20), ("rough", 1.5)]
 )
 def test_less_noise_still_pays(name, floor):
-    plan = {"realizations": 16, "seeds": 12, "error": 1.0, "core_seconds": 60.0}
+    plan = {"realizations": 16, "seeds": 6, "error": 1.0, "core_seconds": 60.0}
     size = Size(side=128, n_rays=8000, realizations=16, seed=0)
     case = CASE[name]
     first = reduced(case, replace(size, realizations=64))

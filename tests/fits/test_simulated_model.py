@@ -355,9 +355,9 @@ def test_the_command_wants_one_surface(
 
 @pytest.mark.slow
 def test_only_the_simulation_is_unbiased_on_light_of_all_bounces() -> None:
-    scans = [simulated_scan(seed) for seed in range(8)]
+    scans = [simulated_scan(seed, n_rays=8_000) for seed in range(8)]
     bias, ratio = {}, {}
-    for title, tried in models().items():
+    for title, tried in models(n_rays=4_000).items():
         results = [fit(one, tried, free=tuple(TRUTH)) for one in scans]
         bias[title] = {name: row[3] for name, row in pulls(results).items()}
         ratio[title] = np.mean([result.chi2 / result.dof for result in results])
