@@ -88,7 +88,7 @@ def spectral(name: str, spectrum: Spectrum, wavelength: float | None) -> float:
         value = spectrum
     return one_number(
         name, value, lambda v: (v >= 0) & np.isfinite(v), "be finite and >= 0",
-        "It is a power or a depth.",
+        "It is a power, a depth or an albedo.",
     )  # fmt: skip
 
 
