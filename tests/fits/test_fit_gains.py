@@ -244,10 +244,10 @@ def test_gains_take_milliseconds():
     fit(measurement, UNIT)
     best = np.inf
     for _ in range(5):
-        start = time.perf_counter()
+        start = time.process_time()
         fit(measurement, UNIT)
-        best = min(best, time.perf_counter() - start)
-    # 20 ms is the aim; other work on the machine may take as much again
+        best = min(best, time.process_time() - start)
+    # Of processor time 20 ms is the aim; a busy machine may take as much again
     assert best < 0.06
 
 
