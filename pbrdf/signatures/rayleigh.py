@@ -254,12 +254,12 @@ class ClearSky(_CleanAir):
 
         Examples
         --------
-        At right angles to the sun light that was scattered twice takes 7 % of polarisation:
+        At right angles to the sun light that was scattered again takes 8 % of polarisation:
 
-        >>> sky = ClearSky(sun=Sun(theta=0.0), optical_depth=0.1, depolarisation=0.0)
-        >>> i, q, u, v = sky.stokes(np.pi / 2 - 1e-9, 0.3, None)
+        >>> sky = ClearSky(sun=Sun(theta=0.9), optical_depth=0.1, depolarisation=0.0)
+        >>> i, q, u, v = sky.stokes(np.pi / 2 - 0.9, np.pi, None)
         >>> round(float(q / i), 2)
-        0.9
+        0.92
         """
         air = self._air(wavelength)
         to_sky = direction(theta, phi)
