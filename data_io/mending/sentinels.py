@@ -191,12 +191,15 @@ def find_spikes_along(x: Array, values: Array) -> Array:
     share = (x[1:-1] - x[:-2]) / (x[2:] - x[:-2])
     away = values[1:-1] - (1 - share) * values[:-2] - share * values[2:]
     usual = _TO_RMS * float(np.median(np.abs(away)))
+    # Beside a gap a bent profile is further from the line: by the product of both steps
+    steps = (x[1:-1] - x[:-2]) * (x[2:] - x[1:-1])
+    reach = np.maximum(steps / np.median(steps), 1)
     before, after = values[1:-1] - values[:-2], values[1:-1] - values[2:]
     least = np.minimum(np.abs(before), np.abs(after))
     # An edge jumps from one neighbour only
     alone = (before * after > 0) & (least > 0.6 * np.abs(away))
     if usual > 0:
-        found[1:-1] = alone & (np.abs(away) > _SPIKE * usual)
+        found[1:-1] = alone & (np.abs(away) > _SPIKE * usual * reach)
     return _unless_texture(found)
 
 

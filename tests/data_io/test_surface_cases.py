@@ -1,5 +1,6 @@
 """Surface files of the kinds people have: each read right, or refused by name."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -473,3 +474,17 @@ def test_the_command_line_reads_pictures_of_heights_and_leaves_faults(tmp_path, 
     assert "--mend 'sentinels' mends" in capsys.readouterr().err
     assert main(["statistics", str(CASES / "height.mat")]) == 2
     assert "--unit" in capsys.readouterr().err
+
+
+def test_a_flank_beside_a_gap_is_no_spike():
+    x = np.delete(np.arange(400) * 0.25, np.arange(101, 140))
+    # Rising into the gap, and low behind it
+    z = np.sin((x - 25.0) / 2.13)
+    profile = Profile(x, z)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", MendWarning)
+        assert mend_profile(profile).size == x.size
+    z = z.copy()
+    z[200] += 5
+    with pytest.warns(MendWarning, match="1 of 361 points jumps"):
+        assert mend_profile(Profile(x, z)).size == x.size - 1
