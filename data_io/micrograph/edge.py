@@ -121,7 +121,7 @@ def edge_profile(
     details: dict[str, Any],
 ) -> EdgeProfile:
     """Remove gaps, blur, grain and tilt from a trace and give it its scale."""
-    good = _clear(trace.quality)
+    good = clear_columns(trace.quality)
     column = trace.columns.astype(float)
     height = np.interp(column, column[good], trace.height[good])
     slope, level = np.polyfit(column, height, 1)
@@ -188,7 +188,7 @@ def _grain_correlation(trace: Trace) -> np.ndarray:
     return found[: int(small[0]) if small.size else found.size]
 
 
-def _clear(quality: np.ndarray) -> np.ndarray:
+def clear_columns(quality: np.ndarray) -> np.ndarray:
     """Return False for columns unlike a step, and for those unlike their neighbours.
 
     Dust on the edge itself leaves a step, only a worse one than everywhere else, and moves

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
-from data_io.micrograph.edge import MIN_QUALITY
+from data_io.micrograph.edge import MIN_QUALITY, clear_columns
 from data_io.micrograph.edges import Trace
 from data_io.micrograph.levels import Levels, flatten
 from pbrdf.errors import DataFileError
@@ -19,6 +19,8 @@ MIN_EXPLAINED = 0.93
 MAX_UNEVEN, EXPLAINED_UNEVEN = 5.0, 0.95
 # An edge with more unclear columns, or with more overhanging ones, is no graph z(x)
 MAX_UNCLEAR, MAX_OVERHANG = 0.3, 0.1
+# Columns apart from unclear ones, between which the others are interpolated
+MIN_CLEAR = 0.1
 # Beyond this angle the columns cut the surface too obliquely. [rad]
 MAX_TILT = np.deg2rad(25)
 # The same holds for an edge that, smoothed over this part of its length, is steeper than
@@ -64,6 +66,8 @@ def fault_of(trace: Trace) -> str | None:
     unclear = float(np.mean(trace.quality < MIN_QUALITY))
     if unclear > MAX_UNCLEAR:
         return f"found one of which {unclear:.0%} is unlike a blurred step"
+    if clear_columns(trace.quality).mean() < MIN_CLEAR:
+        return "found one with something on it every few columns"
     overhang = float(trace.overhang.mean())
     if overhang > MAX_OVERHANG:
         return f"found one that overhangs along {overhang:.0%} of its length"

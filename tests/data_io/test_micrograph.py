@@ -443,3 +443,22 @@ def test_a_width_that_a_fit_does_not_find_is_tried_again():
     case = Path(__file__).parents[1] / "cases" / "surface" / "edge_damaged.jpg"
     found = read_profile_image(case, um_per_pixel=0.5)
     assert 0.0 < found.blur < 1.0
+
+
+def test_an_edge_unclear_every_few_columns_is_refused_and_not_interpolated():
+    """A damaged BMP was taken, and NumPy had no column to interpolate between."""
+    from data_io.micrograph.edges import Trace
+    from data_io.micrograph.refusals import fault_of
+
+    columns = np.arange(100)
+    quality = np.where(columns % 5 == 0, 0.1, 0.99)
+    trace = Trace(
+        columns=columns,
+        height=np.full(100, 20.0),
+        quality=quality,
+        overhang=np.zeros(100, dtype=bool),
+        grain=np.zeros((2, 100)),
+        step_width=1.0,
+        upside_down=False,
+    )
+    assert "every few columns" in fault_of(trace)
