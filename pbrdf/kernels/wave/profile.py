@@ -10,7 +10,7 @@ from pbrdf.kernels.wave.amplitudes import (
     medium_of,
     tangent_plane,
 )
-from pbrdf.kernels.wave.curvature import HORIZON
+from pbrdf.kernels.wave.lanes import HORIZON
 from pbrdf.kernels.wave.scatter import shadowing
 
 __all__ = ["fill_changes", "fill_profile"]

@@ -12,30 +12,16 @@ import numpy as np
 
 from pbrdf.kernels import jit
 from pbrdf.kernels.optics.elementary import erf, exp
-from pbrdf.kernels.wave.amplitudes import (
-    LEAST_COSINE,
-    Ray,
-    blend,
-    first_order,
-    medium_of,
-    tangent_plane,
-    turn_between,
-)
-from pbrdf.kernels.wave.curvature import (
-    ABSORPTION,
-    ACROSS,
-    ALONG,
-    CHANGES,
-    COS_IN,
-    COS_OUT,
-    INDEX,
+from pbrdf.kernels.wave.amplitudes import blend, turn_between
+from pbrdf.kernels.wave.lanes import (
     LANES,
+    PAIR,
     ROWS,
-    SIN_IN,
-    SIN_OUT,
-    SPREAD,
-    change,
+    fill_amplitudes,
     fill_node_changes,
+    jones_of,
+    rays_of,
+    set_lane,
 )
 
 __all__ = [
@@ -158,12 +144,12 @@ def with_curvature(plane, rice, plan, surface, moments, changes, lane):
     pairs, weight = (1, LINE_WEIGHT) if line else (3, HEXAGON_WEIGHT)
     mean = no_jones()
     for k in range(2 * pairs):
-        mean = combined(1.0, mean, weight, change(changes, 8 * k, lane))
+        mean = combined(1.0, mean, weight, jones_of(changes, 8 * k, lane))
     # Scatter about the mean; the node at zero has d = 0
     scatter = max(moments[1] - moments[2], 0.0)
     sums = added(nothing(), scatter * (1.0 - 2 * pairs * weight), mean)
     for k in range(2 * pairs):
-        there = change(changes, 8 * k, lane)
+        there = jones_of(changes, 8 * k, lane)
         sums = added(sums, scatter * weight, combined(1.0, there, -1.0, mean))
     way = combined(1.0, rice, -1.0, plane)
     plain = combined(1.0, plane, -(1.0 + surface.g), mean)
@@ -171,14 +157,13 @@ def with_curvature(plane, rice, plan, surface, moments, changes, lane):
 
 
 @jit(part=True)
-def scattered_sums(ray_in, ray_out, medium, plan, surface, moments, changes, lane):
+def scattered_sums(plan, surface, moments, amplitudes, changes, lane):
     """Products of Jones elements of the scattered light, by the plan's amplitude."""
+    plane, rice = jones_of(amplitudes, 0, lane), jones_of(amplitudes, 8, lane)
     if plan.kernel == RICE:
-        return added(nothing(), moments[2], first_order(ray_in, ray_out, medium))
-    plane = tangent_plane(ray_in, ray_out, medium)
+        return added(nothing(), moments[2], rice)
     if plan.kernel == TANGENT:
         return added(nothing(), moments[2], plane)
-    rice = first_order(ray_in, ray_out, medium)
     if plan.kernel == CURVATURE:
         return with_curvature(plane, rice, plan, surface, moments, changes, lane)
     way = combined(1.0, rice, -1.0, plane)
@@ -244,33 +229,14 @@ def write_matrix(sums, factor, into, away, out):
     out[15] = factor * (ss_pp - sp_ps).real
 
 
-@jit(forceinline=True)
-def set_lane(lanes, lane, angles, indices, spreads, k):
-    """Write geometry k into a lane."""
-    lanes[SIN_IN + lane] = np.sin(angles[0, k])
-    lanes[COS_IN + lane] = max(np.cos(angles[0, k]), LEAST_COSINE)
-    lanes[SIN_OUT + lane] = np.sin(angles[1, k])
-    lanes[COS_OUT + lane] = max(np.cos(angles[1, k]), LEAST_COSINE)
-    # Propagation turns by dphi - pi
-    lanes[ALONG + lane] = -np.cos(angles[2, k])
-    lanes[ACROSS + lane] = -np.sin(angles[2, k])
-    lanes[SPREAD + lane] = spreads[k]
-    lanes[INDEX + lane], lanes[ABSORPTION + lane] = indices[0, k], indices[1, k]
-
-
 @jit(part=True)
-def fill_matrix(lanes, lane, statistics, moments, dressing, plan, changes, out):
+def fill_matrix(lanes, lane, statistics, moments, dressing, plan, amplitudes, changes, out):
     """Fill 16 elements from one lane."""
-    ray_in = Ray(lanes[SIN_IN + lane], lanes[COS_IN + lane], 1.0, 0.0)
-    ray_out = Ray(
-        lanes[SIN_OUT + lane], lanes[COS_OUT + lane],
-        lanes[ALONG + lane], lanes[ACROSS + lane],
-    )  # fmt: skip
-    medium = medium_of(lanes[INDEX + lane], lanes[ABSORPTION + lane])
+    ray_in, ray_out = rays_of(lanes, lane)
     rise = ray_in.cos + ray_out.cos
     height = statistics[0] * rise
     surface = Surface(height * height, statistics[1], statistics[2])
-    sums = scattered_sums(ray_in, ray_out, medium, plan, surface, moments, changes, lane)
+    sums = scattered_sums(plan, surface, moments, amplitudes, changes, lane)
     factor = 1.0 / (np.pi * np.pi * ray_in.cos * ray_out.cos * rise * rise)
     if plan.dimensions == 1:
         factor = 2.0 / (np.pi * ray_in.cos * rise * rise)
@@ -301,17 +267,22 @@ def fill_scattering(angles, indices, statistics, moments, dressing, plan, out):
     out : (N, 16)
         1/sr; of a profile, power per radian over incident power.
     """
-    lanes = np.zeros(ROWS * LANES)
+    lanes, amplitudes = np.zeros(ROWS * LANES), np.empty(PAIR * LANES)
     nodes = 1 if plan.dimensions == 1 else 3
-    changes = np.zeros(nodes * CHANGES * LANES)
+    changes = np.empty(nodes * PAIR * LANES)
     for start in range(0, out.shape[0], LANES):
         count = min(LANES, out.shape[0] - start)
         for lane in range(count):
-            set_lane(lanes, lane, angles, indices, statistics[1], start + lane)
+            k = start + lane
+            set_lane(
+                lanes, lane, angles[0, k], angles[1, k], angles[2, k], statistics[1, k],
+                indices[0, k], indices[1, k],
+            )  # fmt: skip
+        fill_amplitudes(lanes, amplitudes)
         if plan.kernel == CURVATURE:
-            for k in range(nodes):
-                u, v = HEXAGON[k] if nodes == 3 else (SQRT_3, 0.0)
-                rows = changes[k * CHANGES * LANES : (k + 1) * CHANGES * LANES]
+            for node in range(nodes):
+                u, v = HEXAGON[node] if nodes == 3 else (SQRT_3, 0.0)
+                rows = changes[node * PAIR * LANES : (node + 1) * PAIR * LANES]
                 fill_node_changes(lanes, u, v, nodes == 3, rows)
         for lane in range(count):
             k = start + lane
@@ -320,4 +291,4 @@ def fill_scattering(angles, indices, statistics, moments, dressing, plan, out):
                 moments[0, k], moments[1, k], moments[2, k], moments[3, k], moments[4, k],
             )  # fmt: skip
             ways = dressing[0, k], dressing[1, k]
-            fill_matrix(lanes, lane, given, five, ways, plan, changes, out[k])
+            fill_matrix(lanes, lane, given, five, ways, plan, amplitudes, changes, out[k])

@@ -1,4 +1,4 @@
-"""Change of the amplitude where the surface's curvature adds a wave vector, side by side.
+"""Amplitudes of many geometries side by side, and what curvature changes in them.
 
 Geometries lie in rows of `LANES` numbers of one flat array. A loop over them becomes vector
 instructions because the place of every row is a constant and no branch is left; the same
@@ -8,11 +8,15 @@ arithmetic one by one takes three times as long.
 from math import sqrt
 
 from pbrdf.kernels import jit
+from pbrdf.kernels.optics.elementary import cos, sin
 from pbrdf.kernels.wave.amplitudes import (
+    LEAST_COSINE,
     Ray,
     difference,
+    first_order,
     lateral_ray,
     medium_of,
+    tangent_plane,
     turned,
 )
 
@@ -20,18 +24,17 @@ __all__ = [
     "ABSORPTION",
     "ACROSS",
     "ALONG",
-    "CHANGES",
     "COS_IN",
     "COS_OUT",
     "HORIZON",
-    "INDEX",
     "LANES",
+    "PAIR",
     "ROWS",
-    "SIN_IN",
-    "SIN_OUT",
-    "SPREAD",
-    "change",
+    "fill_amplitudes",
     "fill_node_changes",
+    "jones_of",
+    "rays_of",
+    "set_lane",
 ]
 
 # Geometries side by side
@@ -42,9 +45,9 @@ ROWS = 9
 SIN_IN, COS_IN, SIN_OUT, COS_OUT = 0 * LANES, 1 * LANES, 2 * LANES, 3 * LANES
 ALONG, ACROSS, SPREAD = 4 * LANES, 5 * LANES, 6 * LANES
 INDEX, ABSORPTION = 7 * LANES, 8 * LANES
-# Rows of a node: real and imaginary parts of ss, sp, ps, pp for the wave vector and its
-# opposite
-CHANGES = 16
+# Rows of two Jones matrices (real and imaginary parts of ss, sp, ps, pp): of both kernels,
+# or of a node and its opposite
+PAIR = 16
 
 # Local wave vectors reach this share of the horizon, unless a ray given lies beyond
 HORIZON = 0.97
@@ -88,27 +91,62 @@ def wave_vector(ray_in, ray_out, spread, u, v, plane):
 
 
 @jit(forceinline=True)
-def set_jones(changes, row, lane, jones):
-    """Write a Jones matrix into eight rows."""
-    for element in range(4):
-        place = (row + 2 * element) * LANES + lane
-        changes[place], changes[place + LANES] = jones[element].real, jones[element].imag
+def set_lane(lanes, lane, theta_i, theta_s, dphi, spread, n, kappa):
+    """Write a geometry into a lane."""
+    lanes[SIN_IN + lane], lanes[COS_IN + lane] = (
+        sin(theta_i),
+        max(cos(theta_i), LEAST_COSINE),
+    )
+    lanes[SIN_OUT + lane] = sin(theta_s)
+    lanes[COS_OUT + lane] = max(cos(theta_s), LEAST_COSINE)
+    # Propagation turns by dphi - pi
+    lanes[ALONG + lane], lanes[ACROSS + lane] = -cos(dphi), -sin(dphi)
+    lanes[SPREAD + lane], lanes[INDEX + lane], lanes[ABSORPTION + lane] = spread, n, kappa
 
 
 @jit(forceinline=True)
-def change(changes, row, lane):
+def rays_of(lanes, lane):
+    """Ways in and out of a lane."""
+    ray_in = Ray(lanes[SIN_IN + lane], lanes[COS_IN + lane], 1.0, 0.0)
+    ray_out = Ray(
+        lanes[SIN_OUT + lane], lanes[COS_OUT + lane],
+        lanes[ALONG + lane], lanes[ACROSS + lane],
+    )  # fmt: skip
+    return ray_in, ray_out
+
+
+@jit(forceinline=True)
+def set_jones(rows, row, lane, jones):
+    """Write a Jones matrix into eight rows."""
+    for element in range(4):
+        place = (row + 2 * element) * LANES + lane
+        rows[place], rows[place + LANES] = jones[element].real, jones[element].imag
+
+
+@jit(forceinline=True)
+def jones_of(rows, row, lane):
     """Jones matrix of eight rows."""
     place = row * LANES + lane
     return (
-        complex(changes[place], changes[place + LANES]),
-        complex(changes[place + 2 * LANES], changes[place + 3 * LANES]),
-        complex(changes[place + 4 * LANES], changes[place + 5 * LANES]),
-        complex(changes[place + 6 * LANES], changes[place + 7 * LANES]),
+        complex(rows[place], rows[place + LANES]),
+        complex(rows[place + 2 * LANES], rows[place + 3 * LANES]),
+        complex(rows[place + 4 * LANES], rows[place + 5 * LANES]),
+        complex(rows[place + 6 * LANES], rows[place + 7 * LANES]),
     )
 
 
 @jit(part=True, allocates=False)
-def fill_node_changes(lanes, u, v, plane, changes):
+def fill_amplitudes(lanes, rows):
+    """Tangent-plane kernel in the first eight rows, first-order kernel in the next."""
+    for lane in range(LANES):
+        ray_in, ray_out = rays_of(lanes, lane)
+        medium = medium_of(lanes[INDEX + lane], lanes[ABSORPTION + lane])
+        set_jones(rows, 0, lane, tangent_plane(ray_in, ray_out, medium))
+        set_jones(rows, 8, lane, first_order(ray_in, ray_out, medium))
+
+
+@jit(part=True, allocates=False)
+def fill_node_changes(lanes, u, v, plane, rows):
     """First-order less tangent-plane kernel for +-(u, v) times the spread of waves.
 
     Taken at the mean of the two lateral vectors, plus and minus half of it, turned into
@@ -116,11 +154,7 @@ def fill_node_changes(lanes, u, v, plane, changes):
     pp are the same, sp and ps change places and sign.
     """
     for lane in range(LANES):
-        ray_in = Ray(lanes[SIN_IN + lane], lanes[COS_IN + lane], 1.0, 0.0)
-        ray_out = Ray(
-            lanes[SIN_OUT + lane], lanes[COS_OUT + lane],
-            lanes[ALONG + lane], lanes[ACROSS + lane],
-        )  # fmt: skip
+        ray_in, ray_out = rays_of(lanes, lane)
         medium = medium_of(lanes[INDEX + lane], lanes[ABSORPTION + lane])
         x, y = wave_vector(ray_in, ray_out, lanes[SPREAD + lane], u, v, plane)
         middle_x = 0.5 * (ray_out.sin * ray_out.along + ray_in.sin)
@@ -130,5 +164,5 @@ def fill_node_changes(lanes, u, v, plane, changes):
         ss, sp, ps, pp = difference(come, to, medium)
         there = turned((ss, sp, ps, pp), ray_in, ray_out, come, to)
         back = turned((ss, -ps, -sp, pp), ray_in, ray_out, to, come)
-        set_jones(changes, 0, lane, there)
-        set_jones(changes, 8, lane, back)
+        set_jones(rows, 0, lane, there)
+        set_jones(rows, 8, lane, back)
