@@ -42,16 +42,15 @@ def contrast(
     p_other, p_other_err = _dolp(other, other_err)
     first, second = one.sel(stokes="I", drop=True), other.sel(stokes="I", drop=True)
     ratio = (first / second).where(second > 0)
-    relative = np.hypot(
-        one_err.sel(stokes="I", drop=True) / first,
-        other_err.sel(stokes="I", drop=True) / second,
-    )
+    first_err, second_err = (
+        err.sel(stokes="I", drop=True) for err in (one_err, other_err)
+    )  # fmt: skip
     found = xr.Dataset(
         {
             "difference": one - other,
             "difference_stderr": np.hypot(one_err, other_err),
             "ratio": ratio,
-            "ratio_stderr": ratio * relative,
+            "ratio_stderr": np.hypot(first_err, ratio * second_err) / second,
             "dolp_difference": p - p_other,
             "dolp_difference_stderr": np.hypot(p_err, p_other_err),
         }

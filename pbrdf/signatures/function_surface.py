@@ -58,17 +58,20 @@ class FunctionSurface:
 
     def facing(self, sun: Sun, irradiance: float) -> Value:
         """Stokes radiance of sunlight off the surface; irradiance facing the sun."""
-        fine, coarse = (self._disc(sun, irradiance, rings) for rings in (3, 2))
-        return fine, np.abs(fine - coarse)
 
-    def _disc(self, sun: Sun, irradiance: float, rings: int) -> np.ndarray:
-        theta, phi, weight = sun.disc(rings)
-        up = theta < pi / 2
-        theta, phi, weight = theta[up], phi[up], weight[up]
-        column = self._brdf(theta, self.theta, self.phi - phi, phi)[:, :, 0]
-        scattered = irradiance * (column * (weight * np.cos(theta))[:, None]).sum(0)
+        def integrand(points: np.ndarray) -> np.ndarray:
+            x, y = points[:, 0], points[:, 1]
+            theta, phi, weight = sun.disc(self.theta, self.phi + pi, x, y)
+            # What lies below the horizon lights nothing
+            column = self._brdf(
+                np.minimum(theta, pi / 2), self.theta, self.phi - phi, phi
+            )[:, :, 0]  # fmt: skip
+            return column * (weight * np.maximum(np.cos(theta), 0.0))[:, None]
+
+        value, error = self._integral(integrand, [1.0])
         at = self.theta, self.phi
-        return scattered + mirrored_sun(self.beam, at, sun, irradiance)
+        mirrored = mirrored_sun(self.beam, at, sun, irradiance)
+        return irradiance * value + mirrored, irradiance * error
 
     def gather(self, light: Light) -> Value:
         """Stokes radiance that the surface makes of the light of the whole sky."""
@@ -113,25 +116,38 @@ class FunctionSurface:
         self, function: Callable[[np.ndarray, np.ndarray], np.ndarray]
     ) -> Value:
         """Integrate a function of zenith and dphi over the projected hemisphere."""
-        from scipy.integrate import cubature
 
-        def integrand(points: np.ndarray, side: float) -> np.ndarray:
+        def integrand(points: np.ndarray) -> np.ndarray:
             # Cubes of the variables crowd the nodes about the specular direction
-            x, y = points[:, 0], points[:, 1]
+            x, y = np.abs(points[:, 0]), points[:, 1]
+            side = np.where(points[:, 0] > 0, pi / 2 - self.theta, -self.theta)
             theta = np.clip(self.theta + side * x**3, 0.0, pi / 2)
             dphi = pi + pi * y**3
-            weight = abs(side) * 3 * x**2 * pi * 3 * y**2 * np.sin(theta) * np.cos(theta)
+            weight = np.abs(side) * 3 * x**2 * pi * 3 * y**2 * np.sin(theta) * np.cos(theta)
             return function(theta, dphi) * weight[:, None]
 
-        sides = [side for side in (-self.theta, pi / 2 - self.theta) if side]
-        parts = [(side, half) for side in sides for half in (-1.0, 0.0)]
-        scale = sum(np.abs(_rough(integrand, side, half)).max() for side, half in parts)
+        ends = [
+            end for end, side in ((-1.0, self.theta), (1.0, pi / 2 - self.theta)) if side
+        ]
+        return self._integral(integrand, ends)
+
+    def _integral(
+        self, integrand: Callable[[np.ndarray], np.ndarray], ends: list[float]
+    ) -> Value:
+        """Integrate over x from 0 to each of the ends and y from -1 to 1."""
+        from scipy.integrate import cubature
+
+        boxes = [
+            ([min(end, 0.0), low], [max(end, 0.0), low + 1.0])
+            for end in ends
+            for low in (-1.0, 0.0)
+        ]
+        scale = sum(np.abs(_rough(integrand, *box)).max() for box in boxes)
         total, error = np.zeros(4), np.zeros(4)
-        for side, half in parts:
+        for low, high in boxes:
             found = cubature(
-                integrand, [0.0, half], [1.0, half + 1.0], rule="gk15", rtol=0.0,
-                atol=self.rel_error * max(scale, 1e-300), args=(side,),
-                max_subdivisions=500,
+                integrand, low, high, rule="gk15", rtol=0.0,
+                atol=self.rel_error * max(scale, 1e-300), max_subdivisions=500,
             )  # fmt: skip
             total, error = total + found.estimate, error + np.abs(found.error)
         return total, error
@@ -181,13 +197,13 @@ def mirrored_sun(
     return np.asarray(irradiance / (pi * np.sin(sun.radius) ** 2) * beam[:, 0])
 
 
-def _rough(integrand: Any, side: float, half: float) -> np.ndarray:
-    """Integral by a fixed rule, for the scale of the error."""
+def _rough(integrand: Any, low: list[float], high: list[float]) -> np.ndarray:
+    """Integral over a box by a fixed rule, for the scale of the error."""
     node, weight = np.polynomial.legendre.leggauss(16)
-    x = 0.5 + 0.5 * node
-    points = np.stack(np.meshgrid(x, half + x, indexing="ij"), axis=-1).reshape(-1, 2)
+    x, y = (a + (b - a) * (0.5 + 0.5 * node) for a, b in zip(low, high, strict=True))
+    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     both = 0.25 * np.outer(weight, weight).ravel()
-    return np.asarray((integrand(points, side) * both[:, None]).sum(0))
+    return np.asarray((integrand(points) * both[:, None]).sum(0))
 
 
 def _angle(theta_a: float, phi_a: float, theta_b: float, phi_b: float) -> float:

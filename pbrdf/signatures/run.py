@@ -139,6 +139,7 @@ def signature(  # noqa: PLR0913  (the public signature)
             surface = result.surface(wave, float(theta), float(phi), sun_only)
         seen.append(_look(surface, wave, sun, skies, temperature))
     if sun is not None:
+        _tell_two_suns(sun, skies, each)
         _tell_dimming(sun, skies, each)
     relative = (sun is not None and sun.relative) or any(map(_relative, skies))
     axes = {"wavelength": waves, "theta_s": views, "phi_s": azimuths}
@@ -269,6 +270,28 @@ def _tell_dimming(sun: Sun, skies: list[Any], waves: Sequence[float | None]) -> 
             )
     if told:
         warnings.warn(told, AccuracyWarning, stacklevel=3)
+
+
+def _tell_two_suns(sun: Sun, skies: list[Any], waves: Sequence[float | None]) -> None:
+    """Warn of a sky that another sun lights."""
+    for sky in skies:
+        other = getattr(sky, "sun", None)
+        if not isinstance(other, Sun) or other.relative != sun.relative:
+            continue
+        pairs = [
+            (name, getattr(sun, name), getattr(other, name))
+            for name in ("theta", "phi", "distance")
+        ]
+        pairs += [("irradiance", sun.above(wave), other.above(wave)) for wave in waves]
+        for name, one, two in pairs:
+            same = np.cos(one - two) > 1 - 1e-12 if name == "phi" else np.isclose(one, two)
+            if not same:
+                msg = (
+                    f"sun has {name} {one:.6g}, but the sun of {type(sky).__name__} has "
+                    f"{two:.6g}: sky and sunlight are of two suns. Give both the same Sun."
+                )
+                warnings.warn(msg, AccuracyWarning, stacklevel=3)
+                break
 
 
 def _check_light(sun: Any, skies: list[Any], temperature: Any) -> None:

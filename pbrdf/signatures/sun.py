@@ -124,22 +124,48 @@ class Sun:
         depth = spectral("optical_depth", self.optical_depth, wavelength)
         return self.above(wavelength) * exp(-depth / cos(self.theta))
 
-    def disc(self, rings: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return zeniths, azimuths and weights (summing to 1) of points of the disc.
+    def disc(
+        self, theta: float, phi: float, x: np.ndarray, y: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Map the square of x in [0, 1] and y in [-1, 1] onto the disc.
 
-        Gauss-Legendre in the square of the radius, so that weights are parts of its solid
-        angle, at eight angles each.
+        Parameters
+        ----------
+        theta, phi : float
+            Direction near which the points crowd, as a cube of x: a mirror's, whose glint
+            may be far narrower than the disc. [rad]
+        x, y : ndarray
+            Points of the square.
+
+        Returns
+        -------
+        zenith, azimuth, weight : ndarray
+            Directions to points of the disc [rad], and the solid angle of dx dy there over
+            the projected solid angle of the disc, pi sin^2 of its radius: irradiance times
+            weight is radiance times solid angle. [1]
         """
-        node, weight = np.polynomial.legendre.leggauss(rings)
-        radius = self.radius * np.sqrt(0.5 + 0.5 * node)
-        turn = (np.arange(8) + 0.5) * (pi / 4)
-        axis = direction(self.theta, self.phi)
-        south = direction(self.theta + pi / 2, self.phi)
-        east = np.array([-sin(self.phi), cos(self.phi), 0.0])
-        rim = np.cos(turn)[:, None] * south + np.sin(turn)[:, None] * east
-        points = (
-            np.cos(radius)[:, None, None] * axis + np.sin(radius)[:, None, None] * rim
-        ).reshape(-1, 3)
+        pole, axis = direction(theta, phi), direction(self.theta, self.phi)
+        across = np.cross(pole, axis)
+        apart = float(np.arctan2(np.linalg.norm(across), pole @ axis))
+        if apart > 1e-12:
+            across /= np.linalg.norm(across)
+        else:
+            across = np.array([-sin(phi), cos(phi), 0.0])
+        along = np.cross(across, pole)
+        # Turn about the pole, and the radii at which a way from it crosses the rim
+        inside = apart < self.radius
+        widest = pi if inside else asin(min(sin(self.radius) / sin(apart), 1.0))
+        turn = widest * (y if inside else np.sin(0.5 * pi * y))
+        slope = widest * (1.0 if inside else 0.5 * pi * np.cos(0.5 * pi * y))
+        middle = np.arctan2(sin(apart) * np.cos(turn), cos(apart))
+        closest = np.hypot(cos(apart), sin(apart) * np.cos(turn))
+        half = np.arccos(np.minimum(cos(self.radius) / closest, 1.0))
+        first = np.zeros_like(middle) if inside else middle - half
+        radius = first + (middle + half - first) * x**3
+        points = np.cos(radius)[:, None] * pole + np.sin(radius)[:, None] * (
+            np.cos(turn)[:, None] * along + np.sin(turn)[:, None] * across
+        )
+        area = np.sin(radius) * (middle + half - first) * 3 * x**2 * slope
         zenith = np.arctan2(np.hypot(points[:, 0], points[:, 1]), points[:, 2])
         azimuth = np.arctan2(points[:, 1], points[:, 0])
-        return zenith, azimuth, np.repeat(weight / 16, 8)
+        return zenith, azimuth, area / (pi * sin(self.radius) ** 2)

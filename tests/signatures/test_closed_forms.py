@@ -11,6 +11,7 @@ import pbrdf
 from pbrdf import Material, MicrofacetModel
 from pbrdf.errors import AccuracyWarning
 from pbrdf.signatures import (
+    ClearSky,
     OvercastSky,
     RayleighSky,
     SkyTable,
@@ -402,3 +403,68 @@ def test_a_sky_in_degrees_celsius_is_told() -> None:
 def test_a_temperature_in_degrees_celsius_is_told():
     with pytest.warns(AccuracyWarning, match="temperature is 20 K.*add 273.15"):
         pbrdf.signature(PAINT, 0.5, wavelength=10.0, temperature=20.0)
+
+
+def light_of_a_disc(model, view: float, azimuth: float, sun: Sun, rings: int) -> np.ndarray:
+    """Stokes radiance of a disc of unit irradiance, point by point on a fine grid."""
+    share = (np.arange(rings) + 0.5) / rings
+    radius, turn = sun.radius * np.sqrt(share), 2 * pi * share
+    # The disc about the vertical, tilted to the sun
+    x = np.sin(radius)[:, None] * np.cos(turn)
+    y = np.sin(radius)[:, None] * np.sin(turn)
+    z = np.cos(radius)[:, None] + 0 * turn
+    x, z = cos(sun.theta) * x + sin(sun.theta) * z, cos(sun.theta) * z - sin(sun.theta) * x
+    zenith, phi = np.arccos(z).ravel(), sun.phi + np.arctan2(y, x).ravel()
+    column = model.brdf(zenith, view, np.mod(azimuth - phi, 2 * pi))[:, :, 0]
+    return (column * np.cos(zenith)[:, None]).mean(0)
+
+
+@pytest.mark.parametrize(
+    ("slope", "off"), [(1e-3, 0.006), (7e-4, 0.002), (7e-4, 0.006), (5e-4, 0.006)]
+)
+def test_glints_narrower_than_the_sun(slope: float, off: float) -> None:
+    model, sun = MicrofacetModel(Material(1.5), slope), Sun(theta=0.9, phi=0.4)
+    view, azimuth = 0.9 + off, 0.4 + pi + 1e-3
+    seen = pbrdf.signature(model, view, phi_s=azimuth, sun=sun)
+    expected = light_of_a_disc(model, view, azimuth, sun, 400)
+    assert_allclose(seen.radiance.to_numpy().ravel(), expected, rtol=2e-4, atol=1e-4)
+    assert float(seen.radiance_stderr.max()) < 1e-3 * float(seen.radiance.max())
+
+
+@pytest.mark.parametrize("slope", [1e-4, 1e-6])
+def test_glints_become_the_mirrored_sun(slope: float) -> None:
+    sun = Sun(theta=0.9, phi=0.4)
+    there = {"theta_s": 0.902, "phi_s": 0.4 + pi, "sun": sun}
+    found = pbrdf.signature(MicrofacetModel(Material(1.5), slope), **there).radiance
+    mirror = pbrdf.signature(SmoothSurface(Material(1.5)), **there, wavelength=0.5).radiance
+    assert_allclose(
+        found.to_numpy().ravel(), mirror.to_numpy().ravel(), rtol=1e-5, atol=1e-5
+    )
+
+
+def test_a_plate_gets_all_of_a_wide_sun() -> None:
+    sun = Sun(theta=1.0, half_angle=0.19)
+    seen = pbrdf.signature(WHITE, 0.3, sun=sun).radiance.sel(stokes="I")
+    assert_allclose(seen, 0.8 * cos(1.0) / pi, rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("other", "words"),
+    [
+        ({"theta": 0.3}, "sun has theta 0.2, but the sun of ClearSky has 0.3"),
+        ({"theta": 0.2, "phi": 4.0}, "phi 1, but the sun of ClearSky has 4"),
+        ({"theta": 0.2, "irradiance": 7.0}, "irradiance 2, but the sun of ClearSky has 7"),
+    ],
+)
+def test_skies_of_another_sun_are_told(other: dict, words: str) -> None:
+    one = {"theta": 0.2, "phi": 1.0, "irradiance": 2.0, "optical_depth": 0.1}
+    sky = ClearSky(sun=Sun(**{**one, **other}), optical_depth=0.1)
+    with pytest.warns(AccuracyWarning, match=words):
+        pbrdf.signature(PAINT, 0.6, sun=Sun(**one), sky=sky)
+
+
+def test_the_ratio_of_a_dark_target_has_an_error() -> None:
+    sun = Sun(theta=0.9)
+    bright = pbrdf.signature(WHITE, 0.3, sun=sun)
+    dark = bright.assign(radiance=0.0 * bright.radiance)
+    assert np.isfinite(contrast(dark, bright).ratio_stderr).all()

@@ -155,6 +155,7 @@ def polished() -> object:
     )  # fmt: skip
 
 
+@pytest.mark.filterwarnings("ignore:sun has theta 0.9, but the sun of RayleighSky")
 def test_the_beam_of_waves_is_part_of_what_is_seen(polished) -> None:
     """Most light of a polished surface is a beam, which no bin holds; the model has it."""
     model = WaveModel(PAINT, height_rms=0.04, corr_length=6.0)
