@@ -105,7 +105,9 @@ class Prediction:
             values.append(whole)
         ends = [(1 - level) / 2, (1 + level) / 2]
         low, high = np.quantile(np.concatenate(values, axis=-1), ends, axis=-1)
-        return low, high
+        # Draws have a diffuse part that the prediction itself leaves out
+        own = self.brdf(*angles, phi_i=phi_i)[..., 0, 0]
+        return np.minimum(low, own), np.maximum(high, own)
 
     def coherent(
         self, theta_i: npt.ArrayLike, wavelength: float | None = None,

@@ -223,7 +223,7 @@ def planned(*, whole: bool = True, **given: Any) -> Ready:
     )  # fmt: skip
     plans, several = _plans(run, theta_i, given["phi_i"], **geometry)
     if wave is not None:
-        check_waves(scene, wave, run.waves, given["stokes"], plans[0])
+        check_waves(scene, wave, run.waves, given["stokes"], plans)
     return Ready(
         run=run, plans=plans, several=several, single=None, chosen=chosen, given=given
     )

@@ -31,9 +31,10 @@ EVEN_AZIMUTHS, MOST_BEAM = 16, 1e-3
 
 def check_waves(
     scene: Scene, wave: str | WaveModel, waves: Array | None, stokes: str,
-    plan: Plan,
+    plans: list[Plan],
 ) -> None:  # fmt: skip
-    """Refuse what the waves do not know, by name."""
+    """Refuse what the waves do not know, by name. Each azimuth has a plan."""
+    plan = plans[0]
     if isinstance(wave, str):
         arguments.one_of("wave", wave, METHODS)
     elif not isinstance(wave, WaveModel):
@@ -51,12 +52,26 @@ def check_waves(
             "incidences."
         )
         raise ValueError(msg)
+    _check_scene(scene, len(plans))
+    if isinstance(wave, WaveModel):
+        longest, lowest = float(np.max(waves)), float(plan.theta_i.max())
+        _check_fine(scene, wave, longest, lowest)
+
+
+def _check_scene(scene: Scene, azimuths: int) -> None:
+    """Refuse a scene that waves do not know."""
     surface = scene.surface
     if not isinstance(surface, GaussianSurface):
         kind = type(surface).__name__
         msg = (
             f"the surface must be a GaussianSurface with wave, got {kind}: waves see its "
             "statistics. pbrdf.wave.map_scattering takes one map."
+        )
+        raise ValueError(msg)
+    if azimuths > 1 and not surface.isotropic:
+        msg = (
+            f"phi_i must be one azimuth with wave over two lengths, got {azimuths}: the "
+            "specular beam has none. Simulate each azimuth by itself."
         )
         raise ValueError(msg)
     if scene.contaminants:
@@ -72,14 +87,12 @@ def check_waves(
             "first bounce, which the waves replace."
         )
         raise ValueError(msg)
-    if isinstance(wave, WaveModel):
-        _check_fine(scene, wave, surface, float(np.max(waves)), float(plan.theta_i.max()))
 
 
-def _check_fine(
-    scene: Scene, fine: WaveModel, surface: GaussianSurface, longest: float, theta: float
-) -> None:
+def _check_fine(scene: Scene, fine: WaveModel, longest: float, theta: float) -> None:
     """Refuse a fine structure that does not belong to this scene."""
+    surface = scene.surface
+    assert isinstance(surface, GaussianSurface)
     if not surface.isotropic:
         msg = "the surface must be isotropic under a fine structure, got two lengths."
         raise ValueError(msg)

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from pbrdf import GaussianSurface, HeightMap, Material, WaveModel
+from pbrdf import AccuracyWarning, GaussianSurface, HeightMap, Material, WaveModel
 from pbrdf.wave import map_scattering
 from tests import wave_by_the_book as by_the_book
+
+# These maps are coarse on purpose: bins behind the source are left out
+pytestmark = pytest.mark.filterwarnings("ignore:steps of .* leave directions behind")
 
 GIVEN = {"wavelength": 0.6, "phi_i": 0.4, "n_theta": 18, "n_dphi": 24}
 SURFACE = GaussianSurface(shape=(192, 192), spacing=0.2, corr_length=1.6, height_rms=0.1)
@@ -124,3 +127,12 @@ def test_forms_that_need_statistics_are_refused() -> None:
 def test_coarse_maps_are_refused() -> None:
     with pytest.raises(ValueError, match="spacing must be below half the wavelength"):
         map_scattering(SURFACE.sample(1), Material(1.5), 0.6, wavelength=0.3)
+
+
+def test_directions_behind_the_source_want_finer_steps() -> None:
+    # The lateral change is k (sin theta_s + sin theta_i), up to pi over the step
+    surface = GaussianSurface(
+        shape=(64, 64), spacing=0.25, corr_length=1.0, height_rms=0.01
+    )
+    with pytest.warns(AccuracyWarning, match="behind the source out .beyond 44.4 deg"):
+        map_scattering(surface.sample(1), Material(1.5), np.pi / 6, **GIVEN)

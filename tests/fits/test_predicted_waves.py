@@ -70,6 +70,15 @@ def test_the_interval_of_a_smooth_map_holds_its_truth():
     assert (high < 30 * low).all()
 
 
+def test_the_interval_holds_the_prediction_itself():
+    # Each draw has a diffuse part brighter than this mirror's dim directions
+    found = fitting.predict(drawn(periodic=True), Material(1.5), wavelength=WAVE)
+    low, high = found.interval(0.3, VIEW, 2.0)
+    own = found.brdf(0.3, VIEW, 2.0)[:, 0, 0]
+    assert (low <= own).all()
+    assert (own <= high).all()
+
+
 def test_rough_maps_stay_with_facets_and_blur_is_undone():
     rough = HeightMap(20 * SURFACE.sample(seed=3).heights, 0.2, periodic=True)
     found = fitting.predict(rough, Material(1.5), wavelength=WAVE)

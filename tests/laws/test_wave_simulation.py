@@ -113,6 +113,9 @@ def test_brushed_surfaces_turn_with_the_source():
     # All light of all azimuths, with what goes below
     total = around.albedo.sum() + around.coherent[0, 0, 0] + around.absorbed[0]
     assert total.item() == pytest.approx(1.0, abs=1e-9)
+    # Each of several azimuths had the waves of the first
+    with pytest.raises(ValueError, match="phi_i must be one azimuth with wave over two"):
+        simulate(Scene(brushed, "pvc"), 0.5, wave="auto", **given | {"phi_i": [0.0, 1.5]})
 
 
 @pytest.mark.parametrize(

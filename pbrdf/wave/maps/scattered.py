@@ -1,12 +1,14 @@
 """Physical optics of a given map: no statistics assumed, every wave that leaves it."""
 
+import warnings
+
 import numpy as np
 import scipy.fft
 import xarray as xr
 
 from pbrdf.analytic.geometry import checked_zenith
 from pbrdf.conventions import RESULT_VARIABLES, STOKES, detector_bins
-from pbrdf.errors import require
+from pbrdf.errors import AccuracyWarning, require
 from pbrdf.kernels.wave.modes import fill_modes
 from pbrdf.optics import library
 from pbrdf.optics.fresnel import specular_mueller
@@ -92,6 +94,7 @@ def map_scattering(
             f"{steps.max():.4g} um. Interpolate the map, or take a longer wavelength."
         )
         raise ValueError(msg)
+    _tell_what_is_missing(float(steps.max()), angle, wave)
     heights = np.asarray(height_map.heights, dtype=np.float64)
     relief = Relief(heights, steps, periodic=height_map.periodic)
     k = 2 * np.pi / wave
@@ -119,6 +122,21 @@ def map_scattering(
         entry = RESULT_VARIABLES[name]
         result[name].attrs = {"units": entry.units, "long_name": entry.long_name}
     return result.assign_coords(theta_i=angle, wavelength=wave)
+
+
+def _tell_what_is_missing(step: float, angle: float, wave: float) -> None:
+    """Warn of directions behind the source that need finer steps."""
+    reached = 0.5 * wave / step - np.sin(angle)
+    if reached < 1.0:
+        where = (
+            "all" if reached <= 0 else f"beyond {np.rad2deg(np.arcsin(reached)):.3g} deg"
+        )
+        msg = (
+            f"steps of {step:.4g} um leave directions behind the source out ({where}; nan, "
+            f"or without part of their light). All need steps below "
+            f"{0.5 * wave / (1 + np.sin(angle)):.4g} um: interpolate the map."
+        )
+        warnings.warn(msg, AccuracyWarning, stacklevel=3)
 
 
 def one_positive(name: str, value: float) -> float:
