@@ -27,7 +27,8 @@ class Energy:
         Absorbed or transmitted. [1]
     multiple : ndarray
         Part of the reflection that single scattering does not account for; nonzero only
-        where nothing can go below, and else counted in `below`. [1]
+        where nothing can go below, and else counted in `below`. Negative where single
+        scattering has too much light. [1]
     """
 
     coherent: Array
