@@ -148,6 +148,7 @@ def test_a_long_brush_is_a_profile():
     )
 
 
+@pytest.mark.filterwarnings("ignore:steps of .* leave directions behind")
 def test_maps_of_two_lengths_scatter_so_by_their_transform():
     """Kirchhoff integrals of maps, without statistics, against the sum over orders."""
     lengths, height, wave, phi_i = (6.0, 2.5), 0.12, 0.8, 0.7
