@@ -21,11 +21,6 @@ from pbrdf.kernels.wave.amplitudes import (
 )
 
 __all__ = [
-    "ABSORPTION",
-    "ACROSS",
-    "ALONG",
-    "COS_IN",
-    "COS_OUT",
     "HORIZON",
     "LANES",
     "PAIR",

@@ -21,7 +21,7 @@ GAUSSIAN, EXPONENTIAL = range(2)
 # Half-width of a window in standard deviations, and terms in one: both leave 1e-15
 REACH, TERMS_IN_WIDTH = 8.5, 1.3
 LEAST_EXPONENT = -745.0
-# Heaviest order below which sums begin at the first
+# Heaviest order below which sums surely begin at the first
 COARSE = 12.0
 # Orders whose spectra are found together
 TOGETHER = 64
